@@ -1,0 +1,19 @@
+//! Distance fields that people can trust.
+//!
+//! Any shape, one question: how far is it from here? Every answer is an [`geom::Interval`] that
+//! contains the true distance, of zero width where the answer is exact. Lengths are in model
+//! units, distances are negative inside.
+
+pub mod distance;
+pub mod error;
+pub mod geom;
+pub mod grid;
+pub mod mesh;
+pub mod run;
+
+pub use distance::{Closest, Distance};
+pub use error::{Error, Result};
+pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
+pub use grid::Grid;
+pub use mesh::TriangleMesh;
+pub use run::{Cancel, Progress, Run, Silent};
