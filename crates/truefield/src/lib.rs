@@ -4,12 +4,14 @@
 //! contains the true distance, of zero width where the answer is exact. Lengths are in model
 //! units, distances are negative inside.
 
+pub mod bvh;
 pub mod distance;
 pub mod error;
 pub mod geom;
 pub mod grid;
 pub mod mesh;
 pub mod run;
+mod simd;
 
 pub use distance::{Closest, Distance};
 pub use error::{Error, Result};

@@ -1,0 +1,106 @@
+//! Single-precision distances to one triangle from many points at once, with a known error.
+//!
+//! In its frame a triangle lies in the plane z = 0 with its longest edge on the x axis. All lengths
+//! are those of unit directions, so the error is a few ulp of the coordinates also for slivers:
+//! a triangle whose normal is spoilt is so thin that turning it about its longest edge moves nothing.
+
+use crate::geom::DVec3;
+use crate::simd::Fuse;
+
+/// |single-precision distance - distance| <= `FILTER_ERROR` * (largest coordinate difference involved).
+///
+/// About 20 roundings of 2^-24 each lie on the longest path; the tests attack 48.
+pub(crate) const FILTER_ERROR: f64 = 48.0 / 16_777_216.0;
+
+/// A triangle in its own frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    origin: DVec3,
+    x: [f32; 3],
+    y: [f32; 3],
+    z: [f32; 3],
+    /// Length of the longest edge, from (0, 0) to (length, 0).
+    length: f32,
+    /// Unit direction and length of the edge from (length, 0) to the third corner.
+    second: [f32; 2],
+    second_length: f32,
+    /// Unit direction and length of the edge from (0, 0) to the third corner.
+    third: [f32; 2],
+    third_length: f32,
+}
+
+/// Points relative to a base point.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(crate) struct Offsets<const N: usize> {
+    pub x: [f32; N],
+    pub y: [f32; N],
+    pub z: [f32; N],
+}
+
+impl<const N: usize> Offsets<N> {
+    pub fn from_fn(mut offset: impl FnMut(usize) -> DVec3) -> Self {
+        let mut out = Self { x: [0.0; N], y: [0.0; N], z: [0.0; N] };
+        for lane in 0..N {
+            let [x, y, z] = offset(lane).to_array();
+            (out.x[lane], out.y[lane], out.z[lane]) = (x as f32, y as f32, z as f32);
+        }
+        out
+    }
+}
+
+impl Frame {
+    pub fn new(corners: [DVec3; 3]) -> Self {
+        let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).length_squared();
+        let first = (0..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+        let [a, b, c] = std::array::from_fn(|i| corners[(first + i) % 3]);
+        let (ab, ac) = (b - a, c - a);
+        let x = ab.try_normalize().unwrap_or(DVec3::X);
+        // The part of ac across ab; any perpendicular serves when there is none.
+        let across = ac - x * ac.dot(x);
+        let y = across.try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+        let y = (y - x * y.dot(x)).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+        let z = x.cross(y);
+        let single = |v: DVec3| [v.x as f32, v.y as f32, v.z as f32];
+        let edge = |from: DVec3| {
+            let (along, up) = ((c - from).dot(x), (c - from).dot(y));
+            let length = along.hypot(up);
+            if length > 0.0 { ([(along / length) as f32, (up / length) as f32], length as f32) } else { ([0.0, 1.0], 0.0) }
+        };
+        let ((second, second_length), (third, third_length)) = (edge(b), edge(a));
+        Self { origin: a, x: single(x), y: single(y), z: single(z), length: ab.length() as f32, second, second_length, third, third_length }
+    }
+
+    /// Squared distances of `base + offsets` to the triangle.
+    #[inline(always)]
+    pub fn distances_squared<F: Fuse, const N: usize>(&self, base: DVec3, offsets: &Offsets<N>, out: &mut [f32; N]) {
+        let w = base - self.origin;
+        let w = [w.x as f32, w.y as f32, w.z as f32];
+        let dot = |e: &[f32; 3]| F::mul_add(w[2], e[2], F::mul_add(w[1], e[1], w[0] * e[0]));
+        let (x0, y0, z0) = (dot(&self.x), dot(&self.y), dot(&self.z));
+        for lane in 0..N {
+            let (ox, oy, oz) = (offsets.x[lane], offsets.y[lane], offsets.z[lane]);
+            let along = |start: f32, e: &[f32; 3]| F::mul_add(oz, e[2], F::mul_add(oy, e[1], F::mul_add(ox, e[0], start)));
+            let (x, y, z) = (along(x0, &self.x), along(y0, &self.y), along(z0, &self.z));
+            // First edge: on the x axis.
+            let t = x - x.max(0.0).min(self.length);
+            let first = F::mul_add(t, t, y * y);
+            // The others: along and across their unit direction.
+            let (wx, [ex, ey]) = (x - self.length, self.second);
+            let s = F::mul_add(wx, ex, y * ey);
+            let s = s - s.max(0.0).min(self.second_length);
+            let across2 = F::mul_add(wx, ey, -(y * ex));
+            let second = F::mul_add(s, s, across2 * across2);
+            let [ex, ey] = self.third;
+            let s = F::mul_add(x, ex, y * ey);
+            let s = s - s.max(0.0).min(self.third_length);
+            let across3 = F::mul_add(x, ey, -(y * ex));
+            let third = F::mul_add(s, s, across3 * across3);
+            // Inside: above the first edge, left of the second, right of the third.
+            let inside = (y >= 0.0) & (across2 <= 0.0) & (across3 >= 0.0);
+            let plane = first.min(second).min(third);
+            let plane = if inside { 0.0 } else { plane };
+            out[lane] = F::mul_add(z, z, plane);
+        }
+    }
+}

@@ -1,0 +1,190 @@
+//! Nearest triangle of one point and of many.
+
+use super::order::Order;
+use super::tree::{ABSENT, LEAF, Packet, Tree, WIDTH};
+use crate::error::Result;
+use crate::geom::DVec3;
+use crate::run::Run;
+use crate::simd::{Fuse, multiversion};
+
+/// The best triangle so far: its squared distance and index.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// Squared distance.
+    pub distance_squared: f64,
+    /// Triangle index; `u32::MAX` when none was found within the bound.
+    pub triangle: u32,
+}
+
+impl Candidate {
+    /// Nothing found yet within `within` of the point.
+    pub fn within(within: f64) -> Self {
+        Self { distance_squared: within * within, triangle: u32::MAX }
+    }
+
+    /// Whether a triangle was found.
+    pub fn found(&self) -> bool {
+        self.triangle != u32::MAX
+    }
+
+    #[inline(always)]
+    pub(crate) fn offer(&mut self, distance_squared: f64, triangle: u32) {
+        let better = distance_squared < self.distance_squared || (distance_squared == self.distance_squared && triangle < self.triangle);
+        if better {
+            *self = Self { distance_squared, triangle };
+        }
+    }
+}
+
+/// Points a worker answers in one go.
+const CHUNK: usize = 1024;
+
+impl Tree {
+    /// The nearest triangle that is not farther than `best` already is; the lowest index on ties.
+    pub fn nearest(&self, p: DVec3, best: Candidate) -> Candidate {
+        search(self, p, best)
+    }
+
+    /// The nearest triangle of every point.
+    ///
+    /// Points are visited along a space-filling curve, each starting from its predecessor's
+    /// answer; the result does not depend on that order.
+    pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Candidate>> {
+        let order = Order::along_curve(points);
+        let order = order.indices();
+        let blocks = run.blocks("nearest points", order.len().div_ceil(CHUNK), |block| {
+            let part = &order[block * CHUNK..((block + 1) * CHUNK).min(order.len())];
+            let mut out = vec![Candidate::within(f64::INFINITY); part.len()];
+            search_many(self, points, part, &mut out);
+            Ok(out)
+        })?;
+        let mut out = vec![Candidate::within(f64::INFINITY); points.len()];
+        for (&index, candidate) in order.iter().zip(blocks.into_iter().flatten()) {
+            out[index as usize] = candidate;
+        }
+        Ok(out)
+    }
+}
+
+multiversion!(fn search(tree: &Tree, p: DVec3, best: Candidate) -> Candidate = search_body);
+multiversion!(fn search_many(tree: &Tree, points: &[DVec3], order: &[u32], out: &mut [Candidate]) = search_many_body);
+
+#[inline(always)]
+fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], order: &[u32], out: &mut [Candidate]) {
+    let mut warm = 0;
+    for (&index, out) in order.iter().zip(out) {
+        let p = points[index as usize];
+        let start = Candidate { distance_squared: tree.facets[warm].distance_squared(p), triangle: warm as u32 };
+        *out = search_body::<F>(tree, p, start);
+        if out.found() {
+            warm = out.triangle as usize;
+        }
+    }
+}
+
+#[inline(always)]
+fn search_body<F: Fuse>(tree: &Tree, p: DVec3, mut best: Candidate) -> Candidate {
+    let local = p - tree.center;
+    let q = [local.x as f32, local.y as f32, local.z as f32];
+    // What single precision may add to a box distance.
+    let slack = 4.0 * f64::from(f32::EPSILON) * (local.abs().max_element() + tree.radius);
+    let reach = |best: &Candidate| {
+        let d = best.distance_squared.sqrt() + slack;
+        ((d * d) * (1.0 + 4.0 * f64::from(f32::EPSILON))) as f32
+    };
+    let mut limit = reach(&best);
+    let mut stack = [(0.0f32, 0u32); 256];
+    let mut height = 1;
+    while height > 0 {
+        height -= 1;
+        let (distance, index) = stack[height];
+        if distance > limit {
+            continue;
+        }
+        if index & LEAF != 0 {
+            let before = best;
+            visit(&tree.packets[(index & !LEAF) as usize], p, &mut best);
+            if best != before {
+                limit = reach(&best);
+            }
+            continue;
+        }
+        let node = &tree.nodes[index as usize];
+        let mut squared = [0.0f32; WIDTH];
+        for lane in 0..WIDTH {
+            let gap = |axis: usize| (node.min[axis][lane] - q[axis]).max(q[axis] - node.max[axis][lane]).max(0.0);
+            let (x, y, z) = (gap(0), gap(1), gap(2));
+            squared[lane] = x * x + y * y + z * z;
+        }
+        // The children within reach, nearest on top.
+        let start = height;
+        for lane in 0..WIDTH {
+            if squared[lane] <= limit && node.child[lane] != ABSENT {
+                let entry = (squared[lane], node.child[lane]);
+                let mut at = height;
+                while at > start && stack[at - 1].0 < entry.0 {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = entry;
+                height += 1;
+            }
+        }
+    }
+    best
+}
+
+#[inline(always)]
+fn visit(packet: &Packet, p: DVec3, best: &mut Candidate) {
+    let mut squared = [0.0f64; WIDTH];
+    for lane in 0..WIDTH {
+        squared[lane] = packet.facet(lane).distance_squared(p);
+    }
+    for lane in 0..WIDTH {
+        best.offer(squared[lane], packet.triangle[lane]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriangleMesh;
+
+    fn soup(count: usize, size: f64, seed: u64) -> TriangleMesh {
+        let mut state = seed;
+        let mut random = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+        };
+        let mut vertices = Vec::new();
+        for _ in 0..count {
+            let corner = DVec3::new(random(), random(), random());
+            for _ in 0..3 {
+                vertices.push(corner + DVec3::new(random(), random(), random()) * size);
+            }
+        }
+        let triangles = (0..count as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        TriangleMesh::new(vertices, triangles).expect("a soup")
+    }
+
+    #[test]
+    fn equals_brute_force_bit_for_bit() {
+        for (count, size) in [(1, 1.0), (9, 0.5), (300, 0.3), (3000, 0.02)] {
+            let mesh = soup(count, size, count as u64);
+            let tree = Tree::build(&mesh, &Run::default()).expect("a tree");
+            let points: Vec<DVec3> = soup(1000, 3.0, 7).vertices().to_vec();
+            let many = tree.nearest_many(&points, &Run::with_threads(2)).expect("answers");
+            for (p, many) in points.iter().zip(&many) {
+                let mut judge = Candidate::within(f64::INFINITY);
+                for t in 0..count as u32 {
+                    judge.offer(mesh.facet(t).distance_squared(*p), t);
+                }
+                assert_eq!(judge, *many);
+                assert_eq!(judge, tree.nearest(*p, Candidate::within(f64::INFINITY)));
+                let d = judge.distance_squared.sqrt();
+                assert!(!tree.nearest(*p, Candidate::within(d * 0.999_999)).found());
+                assert_eq!(judge, tree.nearest(*p, Candidate::within(d * 1.000_001)));
+            }
+        }
+    }
+}
