@@ -12,16 +12,17 @@ use std::path::{Path, PathBuf};
 const ARROWS: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("run", &[]),
+    ("simd", &[]),
     ("geom", &[]),
     ("distance", &["geom"]),
     ("grid", &["geom", "distance"]),
     ("mesh", &["geom", "distance"]),
-    ("bvh", &["geom", "distance", "grid", "mesh"]),
-    ("source", &["geom", "distance", "grid", "mesh", "bvh"]),
-    ("field", &["geom", "distance", "grid", "mesh", "bvh"]),
-    ("build", &["geom", "distance", "grid", "mesh", "bvh", "source", "field"]),
-    ("op", &["geom", "distance", "grid", "mesh", "bvh", "source", "field", "build"]),
-    ("product", &["geom", "distance", "grid", "mesh", "bvh", "source", "field", "build", "op"]),
+    ("bvh", &["simd", "geom", "distance", "grid", "mesh"]),
+    ("source", &["simd", "geom", "distance", "grid", "mesh", "bvh"]),
+    ("field", &["simd", "geom", "distance", "grid", "mesh", "bvh"]),
+    ("build", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field"]),
+    ("op", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field", "build"]),
+    ("product", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field", "build", "op"]),
     // The laws ask, and know nobody who answers.
     ("laws", &["geom", "distance", "grid", "mesh"]),
 ];
