@@ -12,6 +12,7 @@ pub mod grid;
 pub mod mesh;
 pub mod run;
 mod simd;
+pub mod source;
 
 pub use distance::{Closest, Distance};
 pub use error::{Error, Result};
@@ -19,3 +20,4 @@ pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
 pub use grid::Grid;
 pub use mesh::TriangleMesh;
 pub use run::{Cancel, Progress, Run, Silent};
+pub use source::mesh::{SignChoice, SignKind, SignRule, Surface};

@@ -7,6 +7,16 @@
 /// How `a * b + c` is computed in single-precision filters.
 pub(crate) trait Fuse: Copy {
     fn mul_add(a: f32, b: f32, c: f32) -> f32;
+
+    /// Bit i: `a[i] <= b[i]`.
+    #[inline(always)]
+    fn mask_not_above(a: &[f32; 16], b: &[f32; 16]) -> u32 {
+        let mut mask = 0;
+        for lane in 0..16 {
+            mask |= u32::from(a[lane] <= b[lane]) << lane;
+        }
+        mask
+    }
 }
 
 /// Two roundings: any machine.

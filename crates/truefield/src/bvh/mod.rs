@@ -1,6 +1,9 @@
 //! A tree over triangles and the questions it answers exactly.
 
 mod build;
+pub(crate) mod cover;
+pub(crate) mod descend;
+pub(crate) mod evaluate;
 mod frame;
 mod nearest;
 mod order;

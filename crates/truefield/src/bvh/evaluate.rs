@@ -1,0 +1,121 @@
+//! Exact distances of a small block of points from a complete list of candidates.
+//!
+//! A single-precision pass over all pairs finds for every point the few triangles that can be
+//! nearest within its error; those are asked again in double precision, in lanes. The result has
+//! the bits of brute force.
+
+use super::cover::filter_error;
+use super::frame::Offsets;
+use super::tree::Tree;
+use crate::geom::{Aabb, DVec3};
+use crate::simd::{Fuse, multiversion};
+
+/// Points of a block: 4 x 4 x 4.
+pub(crate) const BLOCK: usize = 64;
+
+const LANES: usize = 16;
+const PARTS: usize = BLOCK / LANES;
+const GROUP: usize = 8;
+
+/// Coordinates of the points of a block.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(crate) struct Points {
+    pub x: [f64; BLOCK],
+    pub y: [f64; BLOCK],
+    pub z: [f64; BLOCK],
+}
+
+/// Squared distance and nearest triangle of every point of a block.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+pub(crate) struct Answers {
+    pub squared: [f64; BLOCK],
+    pub triangle: [u32; BLOCK],
+}
+
+impl Answers {
+    pub const NONE: Self = Self { squared: [f64::INFINITY; BLOCK], triangle: [u32::MAX; BLOCK] };
+}
+
+/// Memory that is used again from block to block.
+#[derive(Debug, Default)]
+pub(crate) struct Rows(Vec<[[f32; LANES]; PARTS]>);
+
+multiversion!(
+    /// Nearest triangles of `points`, all inside `cell`, from its complete ascending list.
+    pub(crate) fn evaluate(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32], rows: &mut Rows, out: &mut Answers) = evaluate_body
+);
+
+#[inline(always)]
+fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32], rows: &mut Rows, out: &mut Answers) {
+    *out = Answers::NONE;
+    if let [only] = list {
+        let every: [u8; BLOCK] = std::array::from_fn(|i| i as u8);
+        return exact(tree, points, *only, &every, out);
+    }
+    let base = cell.center();
+    let offsets: [Offsets<LANES>; PARTS] = std::array::from_fn(|part| {
+        Offsets::from_fn(|lane| {
+            let i = part * LANES + lane;
+            DVec3::new(points.x[i], points.y[i], points.z[i]) - base
+        })
+    });
+    let rows = &mut rows.0;
+    rows.clear();
+    let mut least = [[f32::INFINITY; LANES]; PARTS];
+    for &triangle in list {
+        let frame = &tree.frames[triangle as usize];
+        let mut row = [[0.0; LANES]; PARTS];
+        for part in 0..PARTS {
+            frame.distances_squared::<F, LANES>(base, &offsets[part], &mut row[part]);
+            for lane in 0..LANES {
+                least[part][lane] = least[part][lane].min(row[part][lane]);
+            }
+        }
+        rows.push(row);
+    }
+    // Both sides of a comparison may be off by the error.
+    let error = filter_error(tree, cell) as f32;
+    for lane in least.as_flattened_mut() {
+        let reach = lane.sqrt() + 2.0 * error;
+        *lane = reach * reach * (1.0 + 8.0 * f32::EPSILON);
+    }
+    for (&triangle, row) in list.iter().zip(rows.iter()) {
+        let mut chosen = [0u8; BLOCK + LANES];
+        let mut count = 0;
+        for part in 0..PARTS {
+            let mut mask = F::mask_not_above(&row[part], &least[part]);
+            while mask != 0 {
+                chosen[count] = (part * LANES) as u8 + mask.trailing_zeros() as u8;
+                count += 1;
+                mask &= mask - 1;
+            }
+        }
+        exact(tree, points, triangle, &chosen[..count], out);
+    }
+}
+
+/// Offers `triangle` to the chosen points; triangles come in ascending order, so ties keep the lowest.
+#[inline(always)]
+fn exact(tree: &Tree, points: &Points, triangle: u32, chosen: &[u8], out: &mut Answers) {
+    let facet = tree.facets[triangle as usize];
+    for group in chosen.chunks(GROUP) {
+        let mut p = [[0.0f64; GROUP]; 3];
+        for lane in 0..GROUP {
+            let i = usize::from(group[lane.min(group.len() - 1)]) % BLOCK;
+            (p[0][lane], p[1][lane], p[2][lane]) = (points.x[i], points.y[i], points.z[i]);
+        }
+        let mut squared = [0.0f64; GROUP];
+        for lane in 0..GROUP {
+            squared[lane] = facet.distance_squared(DVec3::new(p[0][lane], p[1][lane], p[2][lane]));
+        }
+        for (lane, &i) in group.iter().enumerate() {
+            let i = usize::from(i) % BLOCK;
+            if squared[lane] < out.squared[i] {
+                out.squared[i] = squared[lane];
+                out.triangle[i] = triangle;
+            }
+        }
+    }
+}

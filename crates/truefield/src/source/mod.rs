@@ -1,0 +1,3 @@
+//! Shapes that can be asked their distance.
+
+pub mod mesh;
