@@ -1,0 +1,17 @@
+"""Distance fields that people can trust: every distance comes with an interval that contains the truth."""
+
+from truefield._truefield import __version__
+from truefield.cloud import PointCloud
+from truefield.errors import FileError, TruefieldError
+from truefield.io import read, read_points
+from truefield.mesh import TriangleMesh
+
+__all__ = [
+    "FileError",
+    "PointCloud",
+    "TriangleMesh",
+    "TruefieldError",
+    "__version__",
+    "read",
+    "read_points",
+]

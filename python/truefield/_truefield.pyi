@@ -1,0 +1,3 @@
+"""The compiled half of truefield."""
+
+__version__: str

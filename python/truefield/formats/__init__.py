@@ -1,0 +1,41 @@
+"""File formats of meshes and points: one file per format, `decode` and `encode`.
+
+The four plain formats are read here, strictly, because every number in the file must be accounted for: a count that
+does not fit, a short line or a word where a number should be is an error and never a silently smaller mesh. The
+containers (glTF, 3MF) go through trimesh, and what it returns is counted against what the file declares.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from truefield.errors import FileError
+from truefield.files import PathLike
+from truefield.formats import obj, off, ply, scene, stl
+
+if TYPE_CHECKING:
+    from truefield.formats.polygons import Soup
+    from truefield.mesh import TriangleMesh
+
+_DECODERS = {".stl": stl.decode, ".obj": obj.decode, ".ply": ply.decode, ".off": off.decode}
+_CONTAINERS = (".glb", ".gltf", ".3mf")
+_ENCODERS = {".stl": stl.encode, ".obj": obj.encode, ".ply": ply.encode, ".off": off.encode}
+READABLE = (*_DECODERS, *_CONTAINERS)
+WRITABLE = tuple(_ENCODERS)
+
+
+def decode(data: bytes, path: Path) -> Soup:
+    """Vertices and triangles of the file's content; `path` gives the format and, for `.gltf`, its neighbours."""
+    suffix = path.suffix.lower()
+    if suffix in _CONTAINERS:
+        return scene.decode(data, path)
+    return _DECODERS[suffix](data)
+
+
+def encode(mesh: TriangleMesh, path: PathLike) -> bytes:
+    """The content of a mesh file of the format that the suffix of `path` names."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in _ENCODERS:
+        raise FileError(f"cannot write a mesh to '{path}': its suffix must be one of {', '.join(WRITABLE)}")
+    return _ENCODERS[suffix](mesh)

@@ -1,0 +1,67 @@
+"""Wavefront OBJ: positions and polygons; fields may be parted by any blanks, tabs too."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truefield.formats.polygons import FormatError, Soup, fan, numbers
+
+if TYPE_CHECKING:
+    from truefield.mesh import TriangleMesh
+
+_SURFACES = (b"surf", b"curv", b"curv2", b"cstype")
+
+
+def decode(data: bytes) -> Soup:
+    """Reads `v` and `f` lines; polygons become fans, negative indices count back, all else is decoration."""
+    if b"\0" in data:
+        raise FormatError("it holds zero bytes, so it is no OBJ, which is text")
+    positions: list[bytes] = []
+    corners: list[int] = []
+    sizes: list[int] = []
+    known = 0
+    curved = False
+    for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), start=1):
+        words = line.split()
+        if not words:
+            continue
+        key = words[0]
+        if key == b"v":
+            if len(words) < 4:
+                raise FormatError(f"vertex {known} (line {number}) has {len(words) - 1} coordinates instead of 3")
+            positions += words[1:4]
+            known += 1
+        elif key in (b"f", b"fo"):
+            face = _corners(words[1:], number)
+            if 0 in face:
+                raise FormatError(f"the face in line {number} refers to vertex 0, but OBJ counts from 1")
+            if len(face) < 3:
+                raise FormatError(f"the face in line {number} has {len(face)} corners; a face needs 3 or more")
+            corners += [index - 1 if index > 0 else index + known for index in face]
+            sizes.append(len(face))
+            if min(corners[-len(face) :]) < 0:
+                raise FormatError(f"the face in line {number} counts back before the first vertex")
+        elif key in _SURFACES:
+            curved = True
+    if curved and not sizes:
+        raise FormatError("it holds curved surfaces but no faces; export it as triangles")
+    if not known and not sizes:
+        raise FormatError("it holds no 'v' and no 'f' lines, so it is no OBJ or an empty one")
+    vertices = numbers(positions, "a vertex").reshape(-1, 3)
+    return Soup(vertices, fan(np.array(corners, dtype=np.int64), np.array(sizes, dtype=np.int64)))
+
+
+def _corners(words: list[bytes], number: int) -> list[int]:
+    try:
+        return [int(word.partition(b"/")[0]) for word in words]
+    except ValueError as error:
+        raise FormatError(f"the face in line {number} holds something that is no index ({error})") from None
+
+
+def encode(mesh: TriangleMesh) -> bytes:
+    """OBJ with shortest decimals that read back as the same float64."""
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.triangles + 1).tolist()]
+    return ("\n".join(lines) + "\n").encode("ascii")

@@ -1,0 +1,154 @@
+"""Triangle meshes as plain, immutable data."""
+
+from __future__ import annotations
+
+from typing import Final, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truefield.errors import TruefieldError
+from truefield.files import PathLike, replacing
+
+Array = NDArray[np.float64]
+_Scalar = TypeVar("_Scalar", bound=np.generic)
+_MOST_VERTICES: Final = 2**32 - 1
+
+
+class TriangleMesh:
+    """Vertices and triangles, checked once: at least one triangle with an area, finite vertices, indices in range.
+
+    Nothing is merged, dropped, reordered or turned. Both arrays are copies, C-contiguous and read-only.
+
+    Args:
+        vertices: (n, 3), x, y, z in model units.
+        triangles: (m, 3) vertex indices, counter-clockwise seen from outside.
+        name: what messages and reports call the part.
+
+    Raises:
+        TruefieldError: the arrays are no mesh; the sentence names the vertex or triangle at fault.
+    """
+
+    __slots__ = ("_extent", "_name", "_triangles", "_vertices")
+
+    def __init__(self, vertices: ArrayLike, triangles: ArrayLike, name: str = "mesh") -> None:
+        """Checks and copies the arrays."""
+        self._name: Final = str(name)
+        self._vertices: Final = _frozen(_points(vertices))
+        self._triangles: Final = _frozen(_indices(triangles, len(self._vertices)))
+        self._extent: Final = _extent(self._vertices, self._triangles)
+
+    @property
+    def name(self) -> str:
+        """What messages and reports call the part."""
+        return self._name
+
+    @property
+    def vertices(self) -> Array:
+        """(n, 3) float64 positions in model units."""
+        return self._vertices
+
+    @property
+    def triangles(self) -> NDArray[np.int64]:
+        """(m, 3) int64 vertex indices, so that differences and products of indices cannot wrap."""
+        return self._triangles
+
+    @property
+    def extent(self) -> tuple[Array, Array]:
+        """The lower and upper corner, each (3,), of the box of all triangles; unused vertices do not count."""
+        return self._extent
+
+    @property
+    def corners(self) -> Array:
+        """(m, 3, 3) corner positions: a fresh array, indexed [triangle, corner, axis]."""
+        return self._vertices[self._triangles]
+
+    def write(self, path: PathLike) -> None:
+        """Writes the mesh; the suffix chooses the format.
+
+        `.stl` binary (float32: the only one that rounds), `.ply` binary little endian with double vertices,
+        `.obj` and `.off` text with digits enough to read the same floats back. The file appears whole or not at all.
+
+        Raises:
+            FileError: the suffix is unknown or the file cannot be written.
+        """
+        from truefield.formats import encode
+
+        data = encode(self, path)
+        with replacing(path) as stream:
+            stream.write(data)
+
+    def __repr__(self) -> str:
+        """Name and counts."""
+        return f"TriangleMesh({self._name!r}, {len(self._vertices)} vertices, {len(self._triangles)} triangles)"
+
+    def __reduce__(self) -> tuple[type[TriangleMesh], tuple[Array, NDArray[np.int64], str]]:
+        """Pickles through the constructor, so that the copy is checked and read-only too."""
+        return TriangleMesh, (self._vertices, self._triangles, self._name)
+
+
+def _points(vertices: ArrayLike) -> Array:
+    try:
+        points = np.array(vertices, dtype=np.float64, order="C", copy=True)
+    except (TypeError, ValueError) as error:
+        raise TruefieldError(
+            f"vertices cannot be turned into numbers ({error}); give an array of shape (n, 3)"
+        ) from None
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise TruefieldError(f"vertices has shape {points.shape}; give an array of shape (n, 3)")
+    if len(points) == 0:
+        raise TruefieldError("the mesh has no vertices; give at least three")
+    if len(points) > _MOST_VERTICES:
+        raise TruefieldError(f"the mesh has {len(points)} vertices, more than 2^32 - 1; split it")
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.all():
+        index = int(np.argmin(finite))
+        x, y, z = points[index].tolist()
+        raise TruefieldError(
+            f"vertex {index} is ({x}, {y}, {z}), one of {int((~finite).sum())} that are not finite; "
+            "all vertices must be finite numbers"
+        )
+    return points
+
+
+def _indices(triangles: ArrayLike, count: int) -> NDArray[np.int64]:
+    try:
+        given = np.asarray(triangles)
+    except ValueError as error:
+        raise TruefieldError(f"triangles is no array ({error}); give vertex indices of shape (m, 3)") from None
+    if given.size == 0:
+        raise TruefieldError("the mesh has no triangles; give it at least one")
+    if given.ndim != 2 or given.shape[1] != 3:
+        raise TruefieldError(f"triangles has shape {given.shape}; give vertex indices of shape (m, 3)")
+    if given.dtype.kind not in "iu":
+        raise TruefieldError(f"triangles has dtype {given.dtype}; give integer vertex indices of shape (m, 3)")
+    outside = ((given < 0) | (given >= count)).any(axis=1)
+    if outside.any():
+        index = int(np.argmax(outside))
+        raise TruefieldError(
+            f"triangle {index} refers to vertices {given[index].tolist()} but the mesh has only {count} vertices "
+            f"(0 to {count - 1})"
+        )
+    return np.array(given, dtype=np.int64, order="C", copy=True)
+
+
+def _extent(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, Array]:
+    corners = vertices[triangles]
+    lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    with np.errstate(over="ignore"):
+        diagonal = float(np.linalg.norm(upper - lower))
+    if not 0.0 < diagonal < np.inf:
+        raise TruefieldError(
+            f"the mesh spans a box with a diagonal of {diagonal}; it must have a positive, finite extent"
+        )
+    # An overflow gives infinity or, of two, NaN: neither is zero, and both come from corners apart.
+    with np.errstate(over="ignore", invalid="ignore"):
+        area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if not area.any():
+        raise TruefieldError(f"all {len(triangles)} triangles of the mesh have zero area; it has no surface")
+    return _frozen(lower), _frozen(upper)
+
+
+def _frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:
+    array.flags.writeable = False
+    return array
