@@ -9,6 +9,8 @@ pub mod distance;
 pub mod error;
 pub mod geom;
 pub mod grid;
+#[cfg(feature = "laws")]
+pub mod laws;
 pub mod mesh;
 pub mod run;
 mod simd;

@@ -92,7 +92,7 @@ impl Builder<'_> {
     fn packet(&mut self, order: &mut [u32]) -> u32 {
         order.sort_unstable();
         let zero = [[0.0; WIDTH]; 3];
-        let mut packet = Packet { a: zero, ab: zero, ac: zero, u: zero, v: zero, inverse: zero, triangle: [0; WIDTH] };
+        let mut packet = Packet { a: zero, ab: zero, ac: zero, v: zero, inverse: zero, slope: [0.0; WIDTH], triangle: [0; WIDTH] };
         for lane in 0..WIDTH {
             let triangle = order[lane.min(order.len() - 1)];
             let facet = &self.facets[triangle as usize];
@@ -100,10 +100,10 @@ impl Builder<'_> {
                 packet.a[axis][lane] = facet.a[axis];
                 packet.ab[axis][lane] = facet.ab[axis];
                 packet.ac[axis][lane] = facet.ac[axis];
-                packet.u[axis][lane] = facet.u[axis];
                 packet.v[axis][lane] = facet.v[axis];
                 packet.inverse[axis][lane] = facet.inverse[axis];
             }
+            packet.slope[lane] = facet.slope;
             packet.triangle[lane] = triangle;
         }
         self.packets.push(packet);

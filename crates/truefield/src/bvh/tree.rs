@@ -29,9 +29,9 @@ pub(crate) struct Packet {
     pub a: [[f64; WIDTH]; 3],
     pub ab: [[f64; WIDTH]; 3],
     pub ac: [[f64; WIDTH]; 3],
-    pub u: [[f64; WIDTH]; 3],
     pub v: [[f64; WIDTH]; 3],
     pub inverse: [[f64; WIDTH]; 3],
+    pub slope: [f64; WIDTH],
     pub triangle: [u32; WIDTH],
 }
 
@@ -39,7 +39,14 @@ impl Packet {
     #[inline(always)]
     pub fn facet(&self, lane: usize) -> Facet {
         let get = |v: &[[f64; WIDTH]; 3]| DVec3::new(v[0][lane], v[1][lane], v[2][lane]);
-        Facet { a: get(&self.a), ab: get(&self.ab), ac: get(&self.ac), u: get(&self.u), v: get(&self.v), inverse: get(&self.inverse) }
+        Facet {
+            a: get(&self.a),
+            ab: get(&self.ab),
+            ac: get(&self.ac),
+            v: get(&self.v),
+            inverse: get(&self.inverse),
+            slope: self.slope[lane],
+        }
     }
 }
 

@@ -6,8 +6,10 @@ use super::{DVec3, Feature};
 ///
 /// The nearest point is the best of the foot on the plane, where that foot lies inside, and of the
 /// feet on the three edges. Every candidate is a point of the triangle, so rounding can only make
-/// the answer longer, by a few ulp of the lengths involved, also for slivers: a barycentric
-/// coordinate that a sliver spoils is off by an ulp of length across the sliver.
+/// the answer longer, by a few ulp of the lengths involved, also for slivers: the foot on the plane
+/// is found along `ab` first and then across it, so that the coordinate which a sliver spoils moves
+/// the foot across the sliver by an ulp of those lengths and not along it. Two barycentric
+/// coordinates with an error each would move it along the sliver by 1 / (relative height) ulp.
 #[derive(Clone, Copy, Debug)]
 pub struct Facet {
     /// First corner.
@@ -16,12 +18,12 @@ pub struct Facet {
     pub ab: DVec3,
     /// See `ab`.
     pub ac: DVec3,
-    /// `dot(w, u)` is the coordinate of `w` along `ab`; 0 where the triangle has no area.
-    pub u: DVec3,
-    /// `dot(w, v)` is the coordinate of `w` along `ac`.
+    /// `dot(w, v)` is the coordinate along `ac` of a `w` that has no part along `ab`; 0 where the triangle has no area.
     pub v: DVec3,
     /// 1 / squared length of edges ab, bc, ca; 0 where the edge has no length.
     pub inverse: DVec3,
+    /// How far `ac` goes along `ab`: `ac - ab * slope` is across `ab`.
+    pub slope: f64,
 }
 
 /// Nearest point of one facet.
@@ -48,19 +50,12 @@ impl Facet {
     pub fn new(a: DVec3, b: DVec3, c: DVec3) -> Self {
         let (ab, ac) = (b - a, c - a);
         let bc = ac - ab;
-        let n = ab.cross(ac);
-        let nn = n.length_squared();
         let reciprocal = |x: f64| if x > 0.0 && (1.0 / x).is_finite() { 1.0 / x } else { 0.0 };
-        // No area leaves the edges alone: s = t = -1 never counts as inside.
-        let flat = reciprocal(nn);
-        Self {
-            a,
-            ab,
-            ac,
-            u: ac.cross(n) * flat,
-            v: n.cross(ab) * flat,
-            inverse: DVec3::new(reciprocal(ab.length_squared()), reciprocal(bc.length_squared()), reciprocal(ac.length_squared())),
-        }
+        let inverse = DVec3::new(reciprocal(ab.length_squared()), reciprocal(bc.length_squared()), reciprocal(ac.length_squared()));
+        let slope = ac.dot(ab) * inverse.x;
+        let across = ac - ab * slope;
+        // No height leaves the edges alone: t = 0 never counts as inside.
+        Self { a, ab, ac, v: across * reciprocal(across.length_squared()), inverse, slope }
     }
 
     /// Squared distance from `p`; the same bits as [`Facet::nearest`].
@@ -76,7 +71,8 @@ impl Facet {
         let bc = self.ac - self.ab;
         let wb = w - self.ab;
         // Edge ab.
-        let s1 = (w.dot(self.ab) * self.inverse.x).clamp(0.0, 1.0);
+        let along = w.dot(self.ab) * self.inverse.x;
+        let s1 = along.clamp(0.0, 1.0);
         let d1 = (w - self.ab * s1).length_squared();
         // Edge bc.
         let t2 = (wb.dot(bc) * self.inverse.y).clamp(0.0, 1.0);
@@ -85,8 +81,8 @@ impl Facet {
         let t3 = (w.dot(self.ac) * self.inverse.z).clamp(0.0, 1.0);
         let d3 = (w - self.ac * t3).length_squared();
         // Face.
-        let s4 = w.dot(self.u);
-        let t4 = w.dot(self.v);
+        let t4 = (w - self.ab * along).dot(self.v);
+        let s4 = along - self.slope * t4;
         let d4 = (w - self.ab * s4 - self.ac * t4).length_squared();
         let inside = (s4 > 0.0) & (t4 > 0.0) & (s4 + t4 < 1.0);
         let mut foot = Foot { distance_squared: d1, s: s1, t: 0.0 };

@@ -1,0 +1,5 @@
+//! The laws: generic checks that every source and every field must pass (feature `laws`).
+
+mod random;
+
+pub use random::Random;
