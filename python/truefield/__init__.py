@@ -1,5 +1,6 @@
 """Distance fields that people can trust: every distance comes with an interval that contains the truth."""
 
+from truefield import shapes
 from truefield._truefield import __version__
 from truefield.cloud import PointCloud
 from truefield.errors import FileError, TruefieldError
@@ -14,4 +15,5 @@ __all__ = [
     "__version__",
     "read",
     "read_points",
+    "shapes",
 ]
