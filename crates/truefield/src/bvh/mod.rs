@@ -1,5 +1,6 @@
 //! A tree over triangles and the questions it answers exactly.
 
+pub(crate) mod boundary;
 mod build;
 pub(crate) mod cover;
 pub(crate) mod descend;
@@ -8,6 +9,7 @@ mod frame;
 mod nearest;
 mod order;
 mod tree;
+pub mod winding;
 
 pub use nearest::Candidate;
 pub use tree::Tree;

@@ -1,5 +1,7 @@
 //! Triangle meshes as plain data.
 
+pub(crate) mod topology;
+
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Facet};
 

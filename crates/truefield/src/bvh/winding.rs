@@ -1,0 +1,450 @@
+//! Generalised winding numbers with a proven error.
+//!
+//! The winding number of a surface S around p is the solid angle of S over 4 pi (Jacobson, Kavan and
+//! Sorkine-Hornung 2013). A triangle's is known in closed form (van Oosterom and Strackee 1983); a
+//! group of triangles that is small for its distance is summed up by its first two moments (Barill et
+//! al. 2018). Unlike there, what the moments leave out is bounded, so every answer is an interval:
+//!
+//! With r = c - p for the group's centre c, R = |r| and G(x) = -1 / |x - p|, the winding number is
+//! `1/(4 pi) * integral of n . grad G(c + y) dA`. The k-th derivative of G along unit directions is at
+//! most k! / R^(k+1) (its diagonal is a Legendre polynomial, and a symmetric form attains its norm
+//! on the diagonal), so the k-th Taylor term of `n . grad G(c + y)` in y is at most
+//! `(k+1)!/k! |y|^k / R^(k+2)`. The sum keeps k = 0 and 1. With |y| <= a, t = a / R < 1 and
+//! `B = integral of |y|^2 dA`, the rest is at most
+//!
+//! `1/(4 pi) * B / R^4 * sum over k >= 2 of (k+1) t^(k-2) = B / (4 pi R^4) * (3 - 2t) / (1 - t)^2`.
+
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
+
+use crate::error::Result;
+use crate::geom::{Aabb, DVec3};
+use crate::run::Run;
+use crate::simd::{Fuse, multiversion};
+
+/// Children of a node and triangles of a leaf.
+const WIDTH: usize = 8;
+
+/// Marks a child that is a leaf.
+const LEAF: u32 = 1 << 31;
+
+/// Half an ulp of 1.
+const UNIT: f64 = f64::EPSILON / 2.0;
+
+/// Rounding of a triangle's numerator and denominator, relative to the product of the three
+/// distances: fewer than 53 units by the count of operations.
+const TRIANGLE_ROUNDING: f64 = 64.0 * UNIT;
+
+/// Rounding of a group's value relative to area / (4 pi R^2), the moments' own included.
+const MOMENT_ROUNDING: f64 = 1024.0 * UNIT;
+
+/// Largest error of [`arctangent`].
+const ARCTANGENT_ERROR: f64 = 3e-10;
+
+/// A triangle is worth at most this, on either side.
+const DOUBT: f64 = 0.5;
+
+type Lanes = [f64; WIDTH];
+
+/// Moments of up to eight groups about their centres, already divided by 4 pi.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Node {
+    center: [Lanes; 3],
+    /// Radius of a ball around the centre that holds the group.
+    radius: Lanes,
+    /// Sum of area vectors.
+    dipole: [Lanes; 3],
+    /// Three times the symmetric traceless part of the integral of n y^T: xx, yy, zz, xy, xz, yz.
+    moment: [Lanes; 6],
+    /// Integral of |y|^2 over the area.
+    spread: Lanes,
+    /// Area times the part of it that rounding may spoil.
+    rounding: Lanes,
+    /// No group is worth more: half its number of triangles.
+    most: Lanes,
+    child: [u32; WIDTH],
+}
+
+/// Up to eight triangles in lanes; unused lanes hold a single point and count for nothing.
+#[derive(Clone, Debug)]
+#[repr(align(64))]
+struct Packet {
+    corners: [[Lanes; 3]; 3],
+    count: usize,
+}
+
+/// A group not yet taken apart.
+#[derive(Clone, Copy)]
+struct Group {
+    value: f64,
+    error: f64,
+    child: u32,
+}
+
+/// A value and the largest possible difference from the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// The value.
+    pub value: f64,
+    /// Not below |value - truth|.
+    pub error: f64,
+    /// The part of `error` that no work removes: one half for each triangle so near that rounding
+    /// hides which side of it the point is on.
+    pub doubt: f64,
+}
+
+/// A tree of moments over triangles. Memory: about 250 bytes a triangle.
+#[derive(Clone, Debug)]
+pub struct Winding {
+    nodes: Vec<Node>,
+    packets: Vec<Packet>,
+    count: usize,
+}
+
+/// What the builder knows about a group; not divided by 4 pi.
+#[derive(Clone, Copy)]
+struct Moments {
+    center: DVec3,
+    area: f64,
+    dipole: DVec3,
+    /// Rows of the integral of n y^T.
+    first: [DVec3; 3],
+    spread: f64,
+}
+
+impl Winding {
+    /// Builds the tree over triangles given by their corners; a triangle given twice counts twice.
+    /// O(n log n).
+    pub fn build(triangles: &[[DVec3; 3]], run: &Run<'_>) -> Result<Self> {
+        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+        let middles: Vec<DVec3> = triangles.iter().map(middle).collect();
+        let mut builder = Builder { triangles, middles: &middles, nodes: Vec::new(), packets: Vec::new() };
+        builder.node(&mut order, run)?;
+        let Builder { nodes, packets, .. } = builder;
+        Ok(Self { nodes, packets, count: triangles.len() })
+    }
+
+    /// The winding number around `p`, to within `accuracy` where rounding allows it; the error is
+    /// what was reached. 0 as accuracy asks for all that f64 can give, in O(n) time.
+    pub fn number(&self, p: DVec3, accuracy: f64) -> Estimate {
+        self.refine(p, |e| e.error <= accuracy)
+    }
+
+    /// Takes groups apart, the most doubtful first, until `enough` or until only single triangles are left.
+    pub fn refine(&self, p: DVec3, enough: impl Fn(Estimate) -> bool) -> Estimate {
+        // Sums kept up to date by differences drift by at most this.
+        let drift = (self.count + WIDTH) as f64 * (64.0 * UNIT);
+        let most = 0.5 * self.count as f64;
+        let mut groups: Vec<Group> = Vec::with_capacity(256);
+        groups.push(Group { value: 0.0, error: most, child: 0 });
+        let mut total = Estimate { value: 0.0, error: most, doubt: 0.0 };
+        let mut tolerance = 0.0625;
+        let mut lanes = Values { value: [0.0; WIDTH], error: [0.0; WIDTH] };
+        loop {
+            let mut index = 0;
+            let mut worst: f64 = 0.0;
+            while index < groups.len() {
+                let group = groups[index];
+                if group.error <= tolerance {
+                    worst = worst.max(group.error);
+                    index += 1;
+                    continue;
+                }
+                groups.swap_remove(index);
+                total.value -= group.value;
+                total.error -= group.error;
+                if group.child & LEAF == 0 {
+                    let node = &self.nodes[group.child as usize];
+                    node_values(node, p, &mut lanes);
+                    for lane in 0..WIDTH {
+                        if node.child[lane] == u32::MAX {
+                            break;
+                        }
+                        groups.push(Group { value: lanes.value[lane], error: lanes.error[lane], child: node.child[lane] });
+                        total.value += lanes.value[lane];
+                        total.error += lanes.error[lane];
+                    }
+                } else {
+                    packet_values(&self.packets[(group.child & !LEAF) as usize], p, &mut lanes);
+                    // Single triangles: taken for good.
+                    for lane in 0..WIDTH {
+                        total.value += lanes.value[lane];
+                        total.error += lanes.error[lane];
+                        total.doubt += if lanes.error[lane] == DOUBT { DOUBT } else { 0.0 };
+                    }
+                }
+                let widened = Estimate { error: total.error + drift, ..total };
+                if enough(widened) {
+                    return widened;
+                }
+            }
+            if worst == 0.0 {
+                break;
+            }
+            tolerance = worst * 0.125;
+        }
+        self.exact(p)
+    }
+
+    /// The sum over all triangles, with rounding the only error.
+    pub fn exact(&self, p: DVec3) -> Estimate {
+        let mut total = Estimate { value: 0.0, error: 0.0, doubt: 0.0 };
+        let mut compensation = 0.0;
+        for packet in &self.packets {
+            for lane in 0..packet.count {
+                let corners = std::array::from_fn(|k| DVec3::from_array(std::array::from_fn(|axis| packet.corners[k][axis][lane])));
+                let one = triangle(&corners, p);
+                // Neumaier's sum: its rounding stays below that of one term.
+                let sum = total.value + one.value;
+                compensation +=
+                    if total.value.abs() >= one.value.abs() { (total.value - sum) + one.value } else { (one.value - sum) + total.value };
+                total.value = sum;
+                total.error += one.error;
+                total.doubt += one.doubt;
+            }
+        }
+        let value = total.value + compensation;
+        Estimate { value, error: total.error * (1.0 + 1e-9) + 4.0 * UNIT * value.abs(), doubt: total.doubt }
+    }
+}
+
+/// The winding number of one triangle around `p`: its solid angle over 4 pi.
+pub fn triangle(corners: &[DVec3; 3], p: DVec3) -> Estimate {
+    let [a, b, c] = corners.map(|v| v - p);
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let lengths = la * lb * lc;
+    let numerator = a.dot(b.cross(c));
+    let denominator = lengths + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    let size = numerator.hypot(denominator);
+    let noise = TRIANGLE_ROUNDING * lengths;
+    // Too near a corner or an edge, or in the plane of the triangle: either side.
+    if !(size > 8.0 * noise) || lengths < 1e-130 || (denominator < 8.0 * noise && numerator.abs() <= noise) {
+        return Estimate { value: 0.0, error: DOUBT, doubt: DOUBT };
+    }
+    // An arctangent turns by at most 1.01 * noise / size here.
+    Estimate { value: numerator.atan2(denominator) * (0.5 * FRAC_1_PI), error: 0.17 * noise / size + 4.0 * UNIT, doubt: 0.0 }
+}
+
+struct Values {
+    value: Lanes,
+    error: Lanes,
+}
+
+multiversion!(fn node_values(node: &Node, p: DVec3, out: &mut Values) = node_values_body);
+multiversion!(fn packet_values(packet: &Packet, p: DVec3, out: &mut Values) = packet_values_body);
+
+#[inline(always)]
+fn node_values_body<F: Fuse>(node: &Node, p: DVec3, out: &mut Values) {
+    for lane in 0..WIDTH {
+        let (x, y, z) = (node.center[0][lane] - p.x, node.center[1][lane] - p.y, node.center[2][lane] - p.z);
+        let squared = x * x + y * y + z * z;
+        let inverse = 1.0 / squared;
+        let reciprocal = inverse.sqrt();
+        let flux = node.dipole[0][lane] * x + node.dipole[1][lane] * y + node.dipole[2][lane] * z;
+        let [xx, yy, zz, xy, xz, yz] = std::array::from_fn(|k| node.moment[k][lane]);
+        let bent = x * (xx * x + 2.0 * (xy * y + xz * z)) + y * (yy * y + 2.0 * yz * z) + zz * z * z;
+        let value = (flux - bent * inverse) * (inverse * reciprocal);
+        let t = node.radius[lane] * reciprocal;
+        let gap = 1.0 - t;
+        let rest = node.spread[lane] * inverse * inverse * (3.0 - 2.0 * t) / (gap * gap);
+        let error = rest * 1.000_001 + node.rounding[lane] * inverse;
+        let most = node.most[lane];
+        let holds = (t < 0.95) & (error < most);
+        out.value[lane] = if holds { value } else { 0.0 };
+        out.error[lane] = if holds { error } else { most };
+    }
+}
+
+/// As [`triangle`], in lanes and with a quicker arctangent.
+#[inline(always)]
+fn packet_values_body<F: Fuse>(packet: &Packet, p: DVec3, out: &mut Values) {
+    let p = p.to_array();
+    for lane in 0..WIDTH {
+        let [a, b, c]: [[f64; 3]; 3] = std::array::from_fn(|k| std::array::from_fn(|axis| packet.corners[k][axis][lane] - p[axis]));
+        let dot = |u: &[f64; 3], v: &[f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+        let (la, lb, lc) = (dot(&a, &a).sqrt(), dot(&b, &b).sqrt(), dot(&c, &c).sqrt());
+        let lengths = la * lb * lc;
+        let cross = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
+        let numerator = dot(&a, &cross);
+        let denominator = lengths + dot(&a, &b) * lc + dot(&b, &c) * la + dot(&c, &a) * lb;
+        let size = (numerator * numerator + denominator * denominator).sqrt();
+        let noise = TRIANGLE_ROUNDING * lengths;
+        let doubtful = (size <= 8.0 * noise) | (lengths < 1e-130) | ((denominator < 8.0 * noise) & (numerator.abs() <= noise));
+        let value = arctangent(numerator, denominator) * (0.5 * FRAC_1_PI);
+        let error = 0.17 * noise / size + (0.16 * ARCTANGENT_ERROR + 4.0 * UNIT);
+        let there = lane < packet.count;
+        out.value[lane] = if there & !doubtful { value } else { 0.0 };
+        out.error[lane] = if there { if doubtful { DOUBT } else { error } } else { 0.0 };
+    }
+}
+
+/// atan2(y, x) within [`ARCTANGENT_ERROR`], without branches; (y, x) must not be (0, 0).
+#[inline(always)]
+fn arctangent(y: f64, x: f64) -> f64 {
+    let (ax, ay) = (x.abs(), y.abs());
+    let (low, high) = (ax.min(ay), ax.max(ay));
+    // Beyond tan(pi/8), turn by pi/4.
+    let far = low > high * 0.414_213_562_373_095;
+    let ratio = if far { (low - high) / (low + high) } else { low / high };
+    let s = ratio * ratio;
+    // Taylor series of atan(z)/z; it alternates, and the first term left out is below 0.4143^23 / 23 < 8e-11.
+    let series = 1.0
+        - s * (1.0 / 3.0
+            - s * (1.0 / 5.0
+                - s * (1.0 / 7.0
+                    - s * (1.0 / 9.0
+                        - s * (1.0 / 11.0
+                            - s * (1.0 / 13.0 - s * (1.0 / 15.0 - s * (1.0 / 17.0 - s * (1.0 / 19.0 - s * (1.0 / 21.0))))))))));
+    let angle = ratio * series + if far { FRAC_PI_4 } else { 0.0 };
+    let angle = if ay > ax { FRAC_PI_2 - angle } else { angle };
+    let angle = if x < 0.0 { PI - angle } else { angle };
+    if y < 0.0 { -angle } else { angle }
+}
+
+struct Builder<'a> {
+    triangles: &'a [[DVec3; 3]],
+    middles: &'a [DVec3],
+    nodes: Vec<Node>,
+    packets: Vec<Packet>,
+}
+
+impl Builder<'_> {
+    /// Adds a node over the triangles of `order` and returns its index and moments.
+    fn node(&mut self, order: &mut [u32], run: &Run<'_>) -> Result<(u32, Moments)> {
+        if order.len() > 4096 {
+            run.cancel.check()?;
+        }
+        let index = self.nodes.len();
+        self.nodes.push(Node::EMPTY);
+        let mut parts: Vec<&mut [u32]> = vec![order];
+        while parts.len() < WIDTH {
+            let largest = (0..parts.len()).rev().max_by_key(|&i| parts[i].len()).filter(|&i| parts[i].len() > WIDTH);
+            let Some(largest) = largest else { break };
+            let part = parts.swap_remove(largest);
+            let (left, right) = self.halve(part);
+            parts.push(left);
+            parts.push(right);
+        }
+        let mut all = Vec::with_capacity(WIDTH);
+        for (lane, part) in parts.into_iter().enumerate() {
+            let (child, moments) = if part.len() <= WIDTH { self.packet(part) } else { self.node(part, run)? };
+            let radius = part
+                .iter()
+                .flat_map(|&t| self.triangles[t as usize])
+                .map(|v| (v - moments.center).length_squared())
+                .fold(0.0, f64::max)
+                .sqrt();
+            self.nodes[index].set(lane, child, &moments, radius, part.len());
+            all.push(moments);
+        }
+        Ok((index as u32, Moments::sum(&all)))
+    }
+
+    fn packet(&mut self, order: &[u32]) -> (u32, Moments) {
+        let mut packet = Packet { corners: [[[0.0; WIDTH]; 3]; 3], count: order.len() };
+        let mut all = Vec::with_capacity(WIDTH);
+        for lane in 0..WIDTH {
+            let corners = self.triangles[order[lane.min(order.len().saturating_sub(1))] as usize];
+            for (k, corner) in corners.iter().enumerate() {
+                for axis in 0..3 {
+                    packet.corners[k][axis][lane] = corner[axis];
+                }
+            }
+            if lane < order.len() {
+                all.push(Moments::of(&corners));
+            }
+        }
+        self.packets.push(packet);
+        (LEAF | (self.packets.len() - 1) as u32, Moments::sum(&all))
+    }
+
+    /// Halves by count along the longest axis.
+    fn halve<'o>(&self, order: &'o mut [u32]) -> (&'o mut [u32], &'o mut [u32]) {
+        let size = Aabb::around(order.iter().map(|&t| self.middles[t as usize])).size();
+        let axis = if size.x >= size.y.max(size.z) {
+            0
+        } else if size.y >= size.z {
+            1
+        } else {
+            2
+        };
+        let half = (order.len() / 2).next_multiple_of(WIDTH).min(order.len() - 1);
+        order.select_nth_unstable_by(half, |&a, &b| {
+            self.middles[a as usize][axis].total_cmp(&self.middles[b as usize][axis]).then(a.cmp(&b))
+        });
+        order.split_at_mut(half)
+    }
+}
+
+impl Node {
+    const EMPTY: Self = Self {
+        center: [[0.0; WIDTH]; 3],
+        radius: [0.0; WIDTH],
+        dipole: [[0.0; WIDTH]; 3],
+        moment: [[0.0; WIDTH]; 6],
+        spread: [0.0; WIDTH],
+        rounding: [0.0; WIDTH],
+        most: [0.0; WIDTH],
+        child: [u32::MAX; WIDTH],
+    };
+
+    fn set(&mut self, lane: usize, child: u32, m: &Moments, radius: f64, count: usize) {
+        const SHARE: f64 = 0.25 * FRAC_1_PI;
+        for axis in 0..3 {
+            self.center[axis][lane] = m.center[axis];
+            self.dipole[axis][lane] = m.dipole[axis] * SHARE;
+        }
+        let trace = (m.first[0].x + m.first[1].y + m.first[2].z) / 3.0;
+        let half = |i: usize, j: usize| 0.5 * (m.first[i][j] + m.first[j][i]);
+        let parts = [m.first[0].x - trace, m.first[1].y - trace, m.first[2].z - trace, half(0, 1), half(0, 2), half(1, 2)];
+        for (k, part) in parts.into_iter().enumerate() {
+            self.moment[k][lane] = part * (3.0 * SHARE);
+        }
+        self.radius[lane] = radius * (1.0 + 1e-12);
+        self.spread[lane] = m.spread * SHARE * (1.0 + 1e-9);
+        self.rounding[lane] = m.area * SHARE * (4.0 * MOMENT_ROUNDING);
+        self.most[lane] = 0.5 * count as f64;
+        self.child[lane] = child;
+    }
+}
+
+impl Moments {
+    fn of(corners: &[DVec3; 3]) -> Self {
+        let [a, b, c] = *corners;
+        let (ab, ac, bc) = (b - a, c - a, c - b);
+        let dipole = ab.cross(ac) * 0.5;
+        // For slivers the cross product may be mostly rounding; the area then bounds that rounding.
+        let area = dipole.length() + 4.0 * UNIT * ab.length() * ac.length();
+        let center = middle(corners);
+        let off = (a - center) + (b - center) + (c - center);
+        // The centre's own rounding is in the first moment.
+        let first = std::array::from_fn(|i| off * (dipole[i] / 3.0));
+        let spread = area * ((ab.length_squared() + ac.length_squared() + bc.length_squared()) / 36.0 + off.length_squared() / 9.0);
+        Self { center, area, dipole, first, spread }
+    }
+
+    fn sum(parts: &[Self]) -> Self {
+        let area: f64 = parts.iter().map(|m| m.area).sum();
+        let base = parts.first().map_or(DVec3::ZERO, |m| m.center);
+        // Where nothing has an area any centre serves.
+        let weight = |m: &Self| if area > 0.0 { m.area / area } else { 0.0 };
+        let center = base + parts.iter().map(|m| (m.center - base) * weight(m)).sum::<DVec3>();
+        let mut sum = Self { center, area, dipole: DVec3::ZERO, first: [DVec3::ZERO; 3], spread: 0.0 };
+        for m in parts {
+            let shift = m.center - center;
+            sum.dipole += m.dipole;
+            for axis in 0..3 {
+                sum.first[axis] += m.first[axis] + shift * m.dipole[axis];
+            }
+            // |y + shift| <= |y| + |shift|; the mixed term vanishes up to the rounding of the centres.
+            let off = m.center.abs().max_element() * (16.0 * UNIT);
+            sum.spread += m.spread + m.area * shift.length() * (shift.length() + 2.0 * off);
+        }
+        sum
+    }
+}
+
+fn middle(corners: &[DVec3; 3]) -> DVec3 {
+    let [a, b, c] = *corners;
+    a + ((b - a) + (c - a)) / 3.0
+}

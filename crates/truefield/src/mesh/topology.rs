@@ -1,0 +1,133 @@
+//! Which triangles meet where: vertices welded by position, sides sorted by edge.
+
+use crate::geom::DVec3;
+use crate::mesh::TriangleMesh;
+
+/// One side of a triangle, from corner `side` to the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleSide {
+    /// Welded ends, the lower first.
+    pub ends: [u32; 2],
+    pub triangle: u32,
+    pub side: u8,
+    /// Whether the triangle runs from the lower end to the higher.
+    pub forward: bool,
+}
+
+/// Neighbourhoods of a mesh whose vertices count as one where their positions are equal (-0 equals 0).
+///
+/// The welding serves the analysis only; nothing is repaired. O(n log n).
+#[derive(Clone, Debug)]
+pub(crate) struct Topology {
+    /// Corners of each triangle by welded vertex: the lowest index among equal positions.
+    pub triangles: Vec<[u32; 3]>,
+    /// Sides of all triangles with three different corners, sorted by edge, then by triangle.
+    sides: Vec<TriangleSide>,
+}
+
+/// Triangles over the same three welded corners.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Copies {
+    /// Turning the same way as the lowest sorted corner order, in index order.
+    pub even: Vec<u32>,
+    /// Turning the other way.
+    pub odd: Vec<u32>,
+}
+
+impl Topology {
+    pub fn new(mesh: &TriangleMesh) -> Self {
+        let weld = weld(mesh.vertices());
+        let triangles: Vec<[u32; 3]> = mesh.triangles().iter().map(|t| t.map(|v| weld[v as usize])).collect();
+        let mut sides = Vec::with_capacity(3 * triangles.len());
+        for (index, t) in triangles.iter().enumerate() {
+            if collapsed(t) {
+                continue;
+            }
+            for side in 0..3 {
+                let (from, to) = (t[side], t[(side + 1) % 3]);
+                sides.push(TriangleSide {
+                    ends: [from.min(to), from.max(to)],
+                    triangle: index as u32,
+                    side: side as u8,
+                    forward: from < to,
+                });
+            }
+        }
+        sides.sort_unstable_by_key(|s| (s.ends, s.triangle));
+        Self { triangles, sides }
+    }
+
+    /// The sides that lie on one edge, edge by edge, in the order of their ends.
+    pub fn edges(&self) -> impl Iterator<Item = &[TriangleSide]> {
+        self.sides.chunk_by(|a, b| a.ends == b.ends)
+    }
+
+    /// Groups of two or more triangles over the same corners.
+    pub fn copies(&self) -> Vec<Copies> {
+        let mut keys: Vec<([u32; 3], u32)> =
+            (0..self.triangles.len() as u32).filter(|&t| !collapsed(&self.triangles[t as usize])).map(|t| (self.sorted(t), t)).collect();
+        keys.sort_unstable();
+        let mut groups = Vec::new();
+        for group in keys.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+            let mut copies = Copies::default();
+            for &(sorted, triangle) in group {
+                let [a, b, c] = self.triangles[triangle as usize];
+                let even = [[a, b, c], [b, c, a], [c, a, b]].contains(&sorted);
+                if even { copies.even.push(triangle) } else { copies.odd.push(triangle) }
+            }
+            groups.push(copies);
+        }
+        groups
+    }
+
+    fn sorted(&self, triangle: u32) -> [u32; 3] {
+        let mut t = self.triangles[triangle as usize];
+        t.sort_unstable();
+        t
+    }
+}
+
+/// Whether two corners coincide: the triangle is a segment or a point.
+pub(crate) fn collapsed(triangle: &[u32; 3]) -> bool {
+    let [a, b, c] = *triangle;
+    a == b || b == c || c == a
+}
+
+/// For every vertex the lowest index at the same position.
+fn weld(vertices: &[DVec3]) -> Vec<u32> {
+    // Adding zero turns -0 into 0.
+    let key = |v: u32| (vertices[v as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut order: Vec<u32> = (0..vertices.len() as u32).collect();
+    order.sort_unstable_by_key(|&v| (key(v), v));
+    let mut weld = vec![0; vertices.len()];
+    for same in order.chunk_by(|&a, &b| key(a) == key(b)) {
+        for &v in same {
+            weld[v as usize] = same[0];
+        }
+    }
+    weld
+}
+
+/// Disjoint sets with path halving; the lowest member names the set.
+#[derive(Clone, Debug)]
+pub(crate) struct Sets(Vec<u32>);
+
+impl Sets {
+    pub fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    pub fn find(&mut self, mut x: u32) -> u32 {
+        while self.0[x as usize] != x {
+            let up = self.0[self.0[x as usize] as usize];
+            self.0[x as usize] = up;
+            x = up;
+        }
+        x
+    }
+
+    pub fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.find(a), self.find(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+}
