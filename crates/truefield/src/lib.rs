@@ -4,9 +4,11 @@
 //! contains the true distance, of zero width where the answer is exact. Lengths are in model
 //! units, distances are negative inside.
 
+pub mod build;
 pub mod bvh;
 pub mod distance;
 pub mod error;
+pub mod field;
 pub mod geom;
 pub mod grid;
 #[cfg(feature = "laws")]
@@ -18,6 +20,7 @@ pub mod source;
 
 pub use distance::{Closest, Distance};
 pub use error::{Error, Result};
+pub use field::{CompleteField, SampledField};
 pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
 pub use grid::Grid;
 pub use mesh::TriangleMesh;

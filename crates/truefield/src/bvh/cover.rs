@@ -29,11 +29,17 @@ pub(crate) struct Scratch {
     stack: Vec<u32>,
 }
 
-/// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending.
-pub(crate) fn gather(tree: &Tree, cell: &Aabb, scratch: &mut Scratch, out: &mut Vec<u32>) -> Range {
+/// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending, if the surface
+/// comes within `within` of it.
+pub(crate) fn gather(tree: &Tree, cell: &Aabb, within: f64, scratch: &mut Scratch, out: &mut Vec<u32>) -> Range {
     let center = cell.center();
     let first = tree.nearest(center, Candidate::within(f64::INFINITY));
     let witness = tree.facets[first.triangle as usize].nearest(center).point;
+    let distance = first.distance_squared.sqrt();
+    if distance - cell.radius() > within {
+        out.clear();
+        return Range { lower: distance - cell.radius(), upper: distance + cell.radius() };
+    }
     let mut rough = Vec::new();
     collect(tree, cell, witness, &mut scratch.stack, &mut rough);
     rough.sort_unstable();

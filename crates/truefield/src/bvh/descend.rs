@@ -116,10 +116,12 @@ impl<'a> Descent<'a> {
     }
 
     /// Visits `tile`, whose edge is at most `edge` (a power of two), and its parts.
-    pub fn tile(&mut self, tile: Block, edge: i64, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
+    ///
+    /// A tile with nothing within `within` is shown with its range and no list.
+    pub fn tile(&mut self, tile: Block, edge: i64, within: f64, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
         let cell = tile.extent(self.lattice, self.span);
         let mut list = self.lists.pop().unwrap_or_default();
-        let range = gather(self.tree, &cell, &mut self.scratch, &mut list);
+        let range = gather(self.tree, &cell, within, &mut self.scratch, &mut list);
         let result = self.block(Visit { block: tile, cell, range, list: &list }, edge, visit);
         self.lists.push(list);
         result

@@ -3,11 +3,13 @@
 mod aabb;
 mod facet;
 mod interval;
+mod overlap;
 
 pub use aabb::Aabb;
 pub use facet::{Facet, FacetPoint};
 pub use glam::DVec3;
 pub use interval::Interval;
+pub use overlap::triangle_overlaps_box;
 
 /// Which part of a triangle is nearest: the papers' cases C1, C2 and C3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -62,6 +62,11 @@ impl Surface {
         &self.tree
     }
 
+    /// The mesh times [`Surface::scale`].
+    pub(crate) fn work(&self) -> &TriangleMesh {
+        &self.work
+    }
+
     /// The power of two between model units and the tree's.
     pub(crate) fn scale(&self) -> f64 {
         self.scale
@@ -134,6 +139,13 @@ impl Surface {
         if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
     }
 
+    /// The range over a box from the interval at its centre: a signed distance is 1-Lipschitz where the
+    /// side changes at the surface only; its absolute value always is.
+    pub(crate) fn over_from(&self, center: Interval, cell: &Aabb) -> Interval {
+        let range = center.widen(cell.radius() * (1.0 + 1e-15));
+        if self.side_changes_at_surface_only() { range } else { Interval::either_side(range.upper.max(-range.lower)) }
+    }
+
     /// The answer in model units for `p` and its nearest triangle in the tree's.
     pub(crate) fn describe(&self, p: DVec3, found: Candidate) -> Nearest {
         let (foot, side) = self.foot_and_side(p, found);
@@ -169,6 +181,10 @@ impl Distance for Surface {
         let p = p * self.scale;
         let (foot, side) = self.foot_and_side(p, self.tree.nearest(p, Candidate::within(f64::INFINITY)));
         self.interval(&foot, side)
+    }
+
+    fn over(&self, cell: &Aabb) -> Interval {
+        self.over_from(self.at(cell.center()), cell)
     }
 }
 

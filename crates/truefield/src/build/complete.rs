@@ -1,0 +1,258 @@
+//! Building a complete field: candidate lists halved down to every cell.
+//!
+//! The paper propagates lists from voxel to voxel; here they are shortened from coarse blocks to cells
+//! ([`crate::bvh::cover`]), which yields the same guarantee with much shorter lists, block by block.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
+use crate::bvh::{Candidate, Tree};
+use crate::error::{Error, Result};
+use crate::field::CompleteField;
+use crate::field::complete::{ABSENT, CELLS, CellBlock, CellClass, CellList, CellWord, EDGE, Entries, LONG, Region};
+use crate::geom::{Aabb, DVec3, triangle_overlaps_box};
+use crate::grid::Grid;
+use crate::run::Run;
+use crate::source::mesh::{Side, Surface};
+
+/// Edge of the blocks that workers take, in cells.
+const TILE: i64 = 32;
+
+/// Lists as short as this are not shortened further: a query over them costs no more than finding them.
+const SHORT: usize = 2;
+
+/// Longer lists are not kept: the tree is quicker.
+const LONGEST: usize = 64;
+
+/// Builds the complete field of `surface` over the cells of `grid` (model units).
+///
+/// The lists take at most `budget` bytes: where they would take more, the longest are replaced by a
+/// search of the tree, until they fit. Every query stays exact.
+pub fn complete(surface: &Arc<Surface>, grid: &Grid, region: Region, budget: u64, run: &Run<'_>) -> Result<CompleteField> {
+    let shape = grid.shape.map(|n| u64::from(n).div_ceil(EDGE as u64));
+    let count = shape.iter().try_fold(1u64, |product, &n| product.checked_mul(n)).unwrap_or(u64::MAX);
+    let needed = count.saturating_mul(size_of::<CellBlock>() as u64);
+    if needed > budget {
+        let [x, y, z] = grid.shape;
+        return Err(Error::Memory { what: format!("a complete field of {x} x {y} x {z} cells"), needed, allowed: budget });
+    }
+    let scale = surface.scale();
+    let scaled = Grid { origin: grid.origin * scale, spacing: grid.spacing * scale, ..*grid };
+    let tiles = Block::tiles(&scaled, TILE);
+    let parts = run.blocks("complete field", tiles.len(), |index| {
+        let mut builder = Builder::new(surface, region);
+        let mut descent = Descent::new(surface.tree(), &scaled, Span::Cells);
+        descent.tile(tiles[index], TILE, f64::INFINITY, &mut |visit| {
+            run.cancel.check()?;
+            builder.visit(visit)
+        })?;
+        Ok(builder.finish())
+    })?;
+    let mut blocks = vec![CellBlock::default(); count as usize];
+    let mut filled = 0;
+    for (place, block) in parts.into_iter().flatten() {
+        let [a, b, c] = place.map(|i| i as usize);
+        blocks[(a * shape[1] as usize + b) * shape[2] as usize + c] = block;
+        filled += 1;
+    }
+    debug_assert_eq!(filled, count);
+    fit(&mut blocks, budget)?;
+    Ok(CompleteField { surface: Arc::clone(surface), grid: *grid, region, blocks })
+}
+
+/// Cuts the longest lists until the field fits its budget.
+fn fit(blocks: &mut [CellBlock], budget: u64) -> Result<()> {
+    let size = |blocks: &[CellBlock]| blocks.iter().map(|b| (b.bytes() + size_of::<CellBlock>()) as u64).sum::<u64>();
+    let mut limit = LONGEST;
+    while size(blocks) > budget {
+        if limit <= 1 {
+            return Err(Error::Memory { what: "the complete field at this resolution".into(), needed: size(blocks), allowed: budget });
+        }
+        limit /= 2;
+        for block in blocks.iter_mut() {
+            *block = Draft::cut(block, limit).seal();
+        }
+    }
+    Ok(())
+}
+
+/// A block of 8 x 8 x 8 cells in the making.
+struct Draft {
+    words: Box<[CellWord; CELLS]>,
+    lists: Vec<Vec<u32>>,
+    known: HashMap<Vec<u32>, u16>,
+}
+
+impl Draft {
+    fn new() -> Self {
+        Self { words: Box::new([ABSENT; CELLS]), lists: Vec::new(), known: HashMap::new() }
+    }
+
+    /// `block` with lists longer than `limit` cut to their first triangle.
+    fn cut(block: &CellBlock, limit: usize) -> Self {
+        let mut draft = Self::new();
+        for cell in 0..CELLS {
+            let (held, class) = block.cell(cell);
+            draft.words[cell] = (class as u16) << 14
+                | match held {
+                    CellList::Absent => ABSENT,
+                    CellList::Start(list) => draft.list(&block.list(list).collect::<Vec<_>>(), usize::MAX),
+                    CellList::Whole(list) => draft.list(&block.list(list).collect::<Vec<_>>(), limit),
+                }
+                | if matches!(held, CellList::Start(_)) { LONG } else { 0 };
+        }
+        draft
+    }
+
+    /// The word of a list, without a class.
+    fn list(&mut self, list: &[u32], limit: usize) -> CellWord {
+        let (list, mark) = if list.len() > limit { (&list[..1], LONG) } else { (list, 0) };
+        if let Some(&known) = self.known.get(list) {
+            return known | mark;
+        }
+        let number = self.lists.len() as u16;
+        self.lists.push(list.to_vec());
+        self.known.insert(list.to_vec(), number);
+        number | mark
+    }
+
+    fn seal(self) -> CellBlock {
+        let mut triangles: Vec<u32> = self.lists.iter().flatten().copied().collect();
+        triangles.sort_unstable();
+        triangles.dedup();
+        let position = |t: &u32| triangles.partition_point(|u| u < t);
+        let entries = self.lists.iter().flatten();
+        let entries = if triangles.len() <= 256 {
+            Entries::Bytes(entries.map(|t| position(t) as u8).collect())
+        } else {
+            Entries::Words(entries.map(|t| position(t) as u16).collect())
+        };
+        let mut starts = vec![0u16];
+        for list in &self.lists {
+            starts.push(starts[starts.len() - 1] + list.len() as u16);
+        }
+        let uniform = self.words[0];
+        let cells = if self.words.iter().all(|&w| w == uniform) { Box::default() } else { Box::<[u16]>::from(&self.words[..]) };
+        CellBlock { triangles: triangles.into(), entries, starts: starts.into(), cells, uniform }
+    }
+}
+
+/// The blocks of one tile.
+struct Builder<'a> {
+    surface: &'a Surface,
+    tree: &'a Tree,
+    region: Region,
+    done: Vec<([i64; 3], CellBlock)>,
+    current: Option<([i64; 3], Draft)>,
+    /// The last block off the surface and its class.
+    settled: Option<(Block, CellClass)>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(surface: &'a Surface, region: Region) -> Self {
+        Self { surface, tree: surface.tree(), region, done: Vec::new(), current: None, settled: None }
+    }
+
+    fn visit(&mut self, at: Visit<'_>) -> Result<Step> {
+        let edge = at.block.edge();
+        if edge > EDGE as i64 {
+            return Ok(Step::Refine);
+        }
+        let settled = self.class_off_surface(&at);
+        match settled {
+            Some(CellClass::Outside) if self.region == Region::Inside => {
+                self.fill(&at.block, CellClass::Outside, None);
+                return Ok(Step::Done);
+            }
+            Some(class) if edge == 1 || at.list.len() <= SHORT => {
+                self.fill(&at.block, class, Some(at.list));
+                return Ok(Step::Done);
+            }
+            None if edge == 1 => {
+                let class = self.class_of_cell(&at);
+                let absent = class == CellClass::Outside && self.region == Region::Inside;
+                self.fill(&at.block, class, (!absent).then_some(at.list));
+                return Ok(Step::Done);
+            }
+            _ => {}
+        }
+        Ok(if at.list.len() <= SHORT && settled.is_some() { Step::Share } else { Step::Refine })
+    }
+
+    /// The class of a block that no triangle touches.
+    fn class_off_surface(&mut self, at: &Visit<'_>) -> Option<CellClass> {
+        if let Some((block, class)) = self.settled {
+            if (0..3).all(|axis| block.low[axis] <= at.block.low[axis] && at.block.high[axis] <= block.high[axis]) {
+                return Some(class);
+            }
+        }
+        if at.range.lower <= 0.0 {
+            return None;
+        }
+        let class = self.side_class(&at.cell, at.list);
+        if class == CellClass::Undecided && at.block.edge() > 1 {
+            return None;
+        }
+        self.settled = Some((at.block, class));
+        Some(class)
+    }
+
+    fn class_of_cell(&self, at: &Visit<'_>) -> CellClass {
+        let touched = at.list.iter().any(|&t| triangle_overlaps_box(self.corners(t), &at.cell));
+        if touched { CellClass::Surface } else { self.side_class(&at.cell, at.list) }
+    }
+
+    /// The one side of a box that no triangle touches.
+    fn side_class(&self, cell: &Aabb, list: &[u32]) -> CellClass {
+        let center = cell.center();
+        let mut best = Candidate::within(f64::INFINITY);
+        for &triangle in list {
+            best.offer(self.tree.facet(triangle).distance_squared(center), triangle);
+        }
+        let foot = self.tree.facet(best.triangle).nearest(center);
+        let side = if self.surface.side_changes_at_surface_only() {
+            Some(self.surface.side(center, &foot, best.triangle))
+        } else {
+            self.surface.side_of_ball(center, &foot, best.triangle, cell.radius())
+        };
+        match side {
+            Some(Side::Inside) => CellClass::Inside,
+            Some(Side::Outside) => CellClass::Outside,
+            _ => CellClass::Undecided,
+        }
+    }
+
+    fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.surface.work().corners(triangle)
+    }
+
+    fn fill(&mut self, block: &Block, class: CellClass, list: Option<&[u32]>) {
+        let place = block.low.map(|i| i.div_euclid(EDGE as i64));
+        if self.current.as_ref().is_none_or(|(current, _)| *current != place) {
+            self.seal();
+            self.current = Some((place, Draft::new()));
+        }
+        let Some((_, draft)) = &mut self.current else { return };
+        let word = (class as u16) << 14 | list.map_or(ABSENT, |list| draft.list(list, LONGEST));
+        for i in block.low[0]..block.high[0] {
+            for j in block.low[1]..block.high[1] {
+                for k in block.low[2]..block.high[2] {
+                    let [i, j, k] = [i, j, k].map(|i| i.rem_euclid(EDGE as i64) as usize);
+                    draft.words[(i * EDGE + j) * EDGE + k] = word;
+                }
+            }
+        }
+    }
+
+    fn seal(&mut self) {
+        if let Some((place, draft)) = self.current.take() {
+            self.done.push((place, draft.seal()));
+        }
+    }
+
+    fn finish(mut self) -> Vec<([i64; 3], CellBlock)> {
+        self.seal();
+        self.done
+    }
+}

@@ -1,0 +1,4 @@
+//! Builders: source to field.
+
+pub mod complete;
+pub mod sampled;

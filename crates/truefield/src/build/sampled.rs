@@ -1,0 +1,245 @@
+//! Dense and narrow-band samples of a surface's signed distance, exact at every sample.
+//!
+//! Coherence does the work: blocks of the lattice are halved with ever shorter lists of candidates
+//! ([`crate::bvh::cover`]), 64 samples at a time are answered from a list, and a side once known
+//! is handed on to every sample that a path off the surface reaches.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
+use crate::bvh::evaluate::{Answers, BLOCK, Points, Rows, evaluate};
+use crate::bvh::{Candidate, Tree};
+use crate::error::{Error, Result};
+use crate::field::SampledField;
+use crate::field::sampled::Continuity;
+use crate::geom::DVec3;
+use crate::grid::Grid;
+use crate::run::Run;
+use crate::source::mesh::{Side, Surface};
+
+/// Edge of the blocks that workers take, in samples.
+const TILE: i64 = 32;
+
+/// Edge of the blocks that are answered at once.
+const EDGE: i64 = 4;
+
+/// Lists as short as this are not shortened further.
+const SHORT: usize = 4;
+
+/// Samples `surface` at the points `lattice.corner(i, j, k)`.
+///
+/// `band` limits the field to |distance| <= band; farther samples hold plus or minus the band.
+/// Needs 4 bytes a sample; refuses more than `memory` bytes.
+pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64, run: &Run<'_>) -> Result<SampledField> {
+    let band = band.unwrap_or(f64::INFINITY);
+    if band.is_nan() || band <= 0.0 {
+        return Err(Error::invalid(format!("the band must be a positive length, not {band}")));
+    }
+    let needed = lattice.shape.iter().map(|&n| u64::from(n)).product::<u64>() * 4;
+    if needed > memory {
+        let [x, y, z] = lattice.shape;
+        return Err(Error::Memory { what: format!("a lattice of {x} x {y} x {z} samples"), needed, allowed: memory });
+    }
+    let [_, ny, nz] = lattice.shape.map(|n| n as usize);
+    let scale = surface.scale();
+    let scaled = Grid { origin: lattice.origin * scale, spacing: lattice.spacing * scale, ..*lattice };
+    let mut values = vec![0.0f32; lattice.len()];
+    let tiles = Block::tiles(&scaled, TILE);
+    let layer = ny * nz;
+    // Tiles of one slab along x share a lock, held only while a finished tile is written.
+    let first = scaled.first[0];
+    let mut slabs: Vec<(i64, Mutex<&mut [f32]>)> = Vec::new();
+    let mut rest = values.as_mut_slice();
+    let mut low = first;
+    while !rest.is_empty() {
+        let high = (low.div_euclid(TILE) + 1) * TILE;
+        let (slab, after) = rest.split_at_mut(((high - low) as usize * layer).min(rest.len()));
+        slabs.push((low, Mutex::new(slab)));
+        (rest, low) = (after, high);
+    }
+    let doubtful = run.blocks("sample distances", tiles.len(), |index| {
+        let tile = tiles[index];
+        let mut sampler = Sampler::new(surface, &scaled, band * scale, tile);
+        let mut descent = Descent::new(surface.tree(), &scaled, Span::Points);
+        // Sides of far tiles of an open mesh may differ from sample to sample: they need their lists.
+        let within = if surface.side_changes_at_surface_only() { band * scale } else { f64::INFINITY };
+        descent.tile(tile, TILE, within, &mut |visit| {
+            run.cancel.check()?;
+            Ok(sampler.visit(visit))
+        })?;
+        let slab = slabs.iter().rfind(|(low, _)| *low <= tile.low[0]);
+        if let Some((low, slab)) = slab {
+            let mut slab = slab.lock().unwrap_or_else(PoisonError::into_inner);
+            sampler.write(&mut slab, *low, &scaled);
+        }
+        Ok(sampler.doubtful)
+    })?;
+    drop(slabs);
+    let mut doubtful: Vec<u64> = doubtful.into_iter().flatten().collect();
+    doubtful.sort_unstable();
+    let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
+    Ok(SampledField { lattice: *lattice, values, band, doubtful, continuity })
+}
+
+/// One tile in the making.
+struct Sampler<'a> {
+    surface: &'a Surface,
+    tree: &'a Tree,
+    lattice: &'a Grid,
+    band: f64,
+    tile: Block,
+    values: Vec<f32>,
+    doubtful: Vec<u64>,
+    /// The last block off the surface and its side.
+    settled: Option<(Block, Side)>,
+    rows: Rows,
+    answers: Answers,
+}
+
+impl<'a> Sampler<'a> {
+    fn new(surface: &'a Surface, lattice: &'a Grid, band: f64, tile: Block) -> Self {
+        let count = (0..3).map(|axis| (tile.high[axis] - tile.low[axis]) as usize).product();
+        Self {
+            surface,
+            tree: surface.tree(),
+            lattice,
+            band,
+            tile,
+            values: vec![0.0; count],
+            doubtful: Vec::new(),
+            settled: None,
+            rows: Rows::default(),
+            answers: Answers::NONE,
+        }
+    }
+
+    fn visit(&mut self, at: Visit<'_>) -> Step {
+        let side = self.side_of(&at);
+        if at.range.lower > self.band {
+            if let Some(side) = side {
+                let value = (side.sign() * self.band / self.surface.scale()) as f32;
+                self.fill(&at.block, value);
+                return Step::Done;
+            }
+        }
+        if at.block.edge() > EDGE {
+            return if at.list.len() <= SHORT && self.band == f64::INFINITY { Step::Share } else { Step::Refine };
+        }
+        let points = block_points(self.lattice, &at.block);
+        evaluate(self.tree, &at.cell, &points, at.list, &mut self.rows, &mut self.answers);
+        let sides = match side {
+            Some(side) => [side; BLOCK],
+            None => self.sides(&at.block, &points),
+        };
+        self.store(&at.block, &sides);
+        Step::Done
+    }
+
+    /// The side of a whole block, if it is certain to have one.
+    fn side_of(&mut self, at: &Visit<'_>) -> Option<Side> {
+        if let Some((block, side)) = self.settled {
+            let within = (0..3).all(|axis| block.low[axis] <= at.block.low[axis] && at.block.high[axis] <= block.high[axis]);
+            if within {
+                return Some(side);
+            }
+        }
+        if at.range.lower <= 0.0 {
+            return None;
+        }
+        let center = at.cell.center();
+        let found = self.tree.nearest(center, Candidate::within(f64::INFINITY));
+        let foot = self.tree.facet(found.triangle).nearest(center);
+        let side = if self.surface.side_changes_at_surface_only() {
+            Some(self.surface.side(center, &foot, found.triangle)).filter(|side| side.is_certain())
+        } else {
+            self.surface.side_of_ball(center, &foot, found.triangle, at.cell.radius())
+        }?;
+        self.settled = Some((at.block, side));
+        Some(side)
+    }
+
+    /// The side of every point of a block, asking only where no neighbour can tell.
+    fn sides(&self, block: &Block, points: &Points) -> [Side; BLOCK] {
+        let mut sides = [Side::Outside; BLOCK];
+        let distance: [f64; BLOCK] = std::array::from_fn(|i| self.answers.squared[i].sqrt());
+        let hand_on = self.surface.side_changes_at_surface_only();
+        // Two balls that meet leave no room for the surface between their centres.
+        let step = self.lattice.spacing * (1.0 + 1e-9);
+        for (i, local) in indices(block) {
+            let told = [(local[2] > 0, 1), (local[1] > 0, 4), (local[0] > 0, 16)]
+                .into_iter()
+                .find(|&(exists, back)| hand_on && exists && distance[i] + distance[i - back] > step && sides[i - back].is_certain());
+            sides[i] = match told {
+                Some((_, back)) => sides[i - back],
+                None => {
+                    let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
+                    let triangle = self.answers.triangle[i];
+                    self.surface.side(p, &self.tree.facet(triangle).nearest(p), triangle)
+                }
+            };
+        }
+        sides
+    }
+
+    fn store(&mut self, block: &Block, sides: &[Side; BLOCK]) {
+        let (scale, limit) = (self.surface.scale(), (self.band / self.surface.scale()) as f32);
+        for (i, local) in indices(block) {
+            let value = (self.answers.squared[i].sqrt() / scale) as f32;
+            let at = self.index([0, 1, 2].map(|axis| block.low[axis] + local[axis]));
+            self.values[at] = sides[i].sign() as f32 * value.min(limit);
+            if !sides[i].is_certain() {
+                let global: [u64; 3] = std::array::from_fn(|axis| (block.low[axis] + local[axis] - self.lattice.first[axis]) as u64);
+                let [_, ny, nz] = self.lattice.shape.map(u64::from);
+                self.doubtful.push((global[0] * ny + global[1]) * nz + global[2]);
+            }
+        }
+    }
+
+    fn fill(&mut self, block: &Block, value: f32) {
+        for i in block.low[0]..block.high[0] {
+            for j in block.low[1]..block.high[1] {
+                let start = self.index([i, j, block.low[2]]);
+                let count = (block.high[2] - block.low[2]) as usize;
+                self.values[start..start + count].fill(value);
+            }
+        }
+    }
+
+    /// Where global lattice point `(i, j, k)` stands in the tile.
+    fn index(&self, [i, j, k]: [i64; 3]) -> usize {
+        let Block { low, high } = self.tile;
+        (((i - low[0]) * (high[1] - low[1]) + j - low[1]) * (high[2] - low[2]) + k - low[2]) as usize
+    }
+
+    /// Copies the tile into its slab, whose first layer is `start`.
+    fn write(&self, slab: &mut [f32], start: i64, lattice: &Grid) {
+        let Block { low, high } = self.tile;
+        let [_, ny, nz] = lattice.shape.map(|n| n as usize);
+        let length = (high[2] - low[2]) as usize;
+        for (row, values) in self.values.chunks_exact(length).enumerate() {
+            let rows = (high[1] - low[1]) as usize;
+            let i = (low[0] - start) as usize + row / rows;
+            let j = (low[1] - lattice.first[1]) as usize + row % rows;
+            let k = (low[2] - lattice.first[2]) as usize;
+            let at = (i * ny + j) * nz + k;
+            slab[at..at + length].copy_from_slice(values);
+        }
+    }
+}
+
+/// The points of a block of at most 4 x 4 x 4; slots beyond a clipped block repeat its last points.
+fn block_points(lattice: &Grid, block: &Block) -> Points {
+    let mut points = Points { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+    let at = |axis: usize, step: usize| (block.low[axis] + step as i64).min(block.high[axis] - 1);
+    for i in 0..BLOCK {
+        let p = lattice.corner(at(0, i >> 4), at(1, i >> 2 & 3), at(2, i & 3));
+        (points.x[i], points.y[i], points.z[i]) = (p.x, p.y, p.z);
+    }
+    points
+}
+
+/// The slots of a block that hold its points, with their position in it.
+fn indices(block: &Block) -> impl Iterator<Item = (usize, [i64; 3])> + use<> {
+    let size: [i64; 3] = std::array::from_fn(|axis| block.high[axis] - block.low[axis]);
+    (0..size[0]).flat_map(move |i| (0..size[1]).flat_map(move |j| (0..size[2]).map(move |k| ((i * 16 + j * 4 + k) as usize, [i, j, k]))))
+}
