@@ -19,7 +19,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("mesh", &["geom", "distance"]),
     ("bvh", &["simd", "geom", "distance", "grid", "mesh"]),
     ("source", &["simd", "geom", "distance", "grid", "mesh", "bvh"]),
-    ("field", &["simd", "geom", "distance", "grid", "mesh", "bvh"]),
+    ("field", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source"]),
     ("build", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field"]),
     ("op", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field", "build"]),
     ("product", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field", "build", "op"]),
@@ -64,11 +64,11 @@ fn made_up_imports_are_judged() {
     // Against them: plain, grouped, renamed, through super, in an expression, through a re-export.
     assert_eq!(judge(&["geom", "aabb"], "use crate::grid::Grid;"), 1);
     assert_eq!(judge(&["geom"], "use crate::grid::Grid;"), 1);
-    assert_eq!(judge(&["field", "complete"], "use crate::{\n    geom::{Aabb, DVec3},\n    source::mesh::Surface as S,\n};"), 1);
+    assert_eq!(judge(&["field", "complete"], "use crate::{\n    geom::{Aabb, DVec3},\n    build::complete::complete as c,\n};"), 1);
     assert_eq!(judge(&["mesh"], "pub(crate) use super::bvh::Tree;"), 1);
     assert_eq!(judge(&["mesh", "check"], "use super::super::{bvh, geom};"), 1);
     assert_eq!(judge(&["build", "complete"], "fn f() { let x = crate::product::contour::trace(); }"), 1);
-    assert_eq!(judge(&["field"], "use crate::Surface;"), 1);
+    assert_eq!(judge(&["mesh"], "use crate::Surface;"), 1);
     assert_eq!(judge(&["run"], "use crate::geom::Aabb;"), 1);
     assert_eq!(judge(&["bvh"], "mod inner { use super::super::source::X; }"), 1);
     // Neither comments nor strings import; unit tests may look anywhere; unknown modules need a place.
