@@ -154,6 +154,12 @@ def test_ply_with_lines_of_carriage_return_and_line_feed(tmp_path: Path) -> None
     assert np.array_equal(again.triangles, cube().triangles)
 
 
+def test_ply_with_other_lists_beside_the_corners(tmp_path: Path) -> None:
+    header, end, body = ply_text().replace("int group", "list uchar float texcoord").partition("end_header")
+    again = tf.read(wrote(tmp_path / "cube.ply", header + end + body.replace(" 7\n", " 2 0.25 nan\n")))
+    assert np.array_equal(again.triangles, cube().triangles)
+
+
 def test_off_with_counts_beside_the_keyword_comments_colours_and_polygons(tmp_path: Path) -> None:
     rows = "".join(f"{x} {y} {z} 0.5 0.5 0.5 1 # corner\n" for x, y, z in CORNERS.tolist())
     faces = "".join(f"4 {a} {b} {c} {d} 255 0 0\n" for a, b, c, d in QUADS)
@@ -229,6 +235,7 @@ BAD_FILES = [
     ("header.stl", struct.pack("<80sI", b"", 0), "no triangles"),
     ("none.stl", b"solid\nendsolid\n", "no triangles"),
     ("degenerate.stl", binary_stl(), "diagonal of 0.0"),
+    ("minus.stl", b"\xff" * 84, "truncated"),
     ("cut-text.stl", stl_text(cube())[:-200], "truncated"),
     ("cut-end.stl", stl_text(cube())[:-10], "truncated"),
     ("word.stl", stl_text(cube()).replace("vertex 1.0", "vertex one"), "no number"),
@@ -241,6 +248,7 @@ BAD_FILES = [
     ("points.obj", TRIANGLE, "no triangles"),
     ("curved.obj", TRIANGLE + "cstype bspline\nsurf 0 1 0 1 1 2 3\n", "curved surfaces"),
     ("range.obj", TRIANGLE + "f 1 2 4\n", "triangle 0 refers to vertices .* only 3"),
+    ("beyond.obj", TRIANGLE + "f 1 2 99999999999999999999\n", "line 4 refers to a vertex beyond"),
     ("zero.obj", TRIANGLE + "f 0 1 2\n", "line 4 refers to vertex 0"),
     ("back.obj", TRIANGLE + "f -1 -2 -4\n", "line 4 counts back"),
     ("cut-face.obj", TRIANGLE + "f 1 2", "line 4 has 2 corners"),
@@ -258,6 +266,9 @@ BAD_FILES = [
     ("cut-little.ply", ply_binary("<")[:-1], "truncated"),
     ("cut-big.ply", ply_binary(">")[:-60], "truncated"),
     ("huge.ply", ply_binary("<").replace(b"vertex 8", b"vertex 4000000000"), "truncated"),
+    ("long.ply", ply_text().replace("face 7", "face 6"), r"goes on after the last element it declares \(6 numbers"),
+    ("long-binary.ply", ply_binary("<") + b"more", r"goes on after the last element it declares \(4 bytes"),
+    ("header-words.ply", ply_text().replace("face 7", "face 7 7"), "'element face 7 7' makes no sense"),
     ("length.ply", ply_text().replace("4 4 5 7 6", "-4 4 5 7 6"), "length of a list"),
     ("range.ply", ply_text().replace("4 4 5 7 6", "4 4 5 7 8"), "only 8 vertices"),
     ("half.ply", ply_text().replace("4 4 5 7 6", "4 4 5 7.5 6"), "no whole number"),
@@ -270,7 +281,8 @@ BAD_FILES = [
     ("binary.off", b"OFF BINARY\n\0\0", "binary OFF"),
     ("counts.off", b"OFF\n", "count line"),
     ("negative.off", b"OFF\n-3 1 0\n", "count line"),
-    ("cut.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "truncated.*3 vertices and 1 faces but only 3 lines"),
+    ("cut.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n", "truncated.*3 vertices and 1 faces, and 3 lines"),
+    ("long.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n", "goes on after its last face"),
     ("face.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1", "face 0 declares 3 corners and lists 2"),
     ("vertex.off", b"OFF\n3 1 0\n0 0\n1 0 0\n0 1 0\n3 0 1 2", "vertex 0 has 2 coordinates"),
     ("range.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 -1", "only 3 vertices"),

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truefield.errors import FileError, TruefieldError
-from truefield.files import PathLike, replacing
+from truefield.errors import TruefieldError
+from truefield.files import PathLike
 
 _Scalar = TypeVar("_Scalar", bound=np.generic)
-_SUFFIXES = (".ply", ".csv", ".xyz")
 _RESERVED = ("x", "y", "z", "nx", "ny", "nz", "triangle")
 
 
@@ -88,23 +86,9 @@ class PointCloud:
         Raises:
             FileError: the suffix is unknown or the file cannot be written.
         """
-        suffix = Path(path).suffix.lower()
-        if suffix not in _SUFFIXES:
-            raise FileError(f"cannot write points to '{path}': its suffix must be one of {', '.join(_SUFFIXES)}")
-        columns = self._columns()
-        with replacing(path) as stream:
-            if suffix == ".ply":
-                from truefield.formats import ply
+        from truefield.formats import table
 
-                stream.write(ply.encode_points(columns))
-            else:
-                from truefield.formats import points
-
-                if suffix == ".csv":
-                    stream.write(",".join(columns).encode() + b"\n")
-                else:
-                    columns = {name: column for name, column in columns.items() if name in _RESERVED[:6]}
-                points.encode_rows(stream, columns, "," if suffix == ".csv" else " ")
+        table.write(path, self._columns())
 
     def _columns(self) -> dict[str, NDArray[np.generic]]:
         columns: dict[str, NDArray[np.generic]] = dict(zip("xyz", self._points.T, strict=True))

@@ -55,9 +55,12 @@ def decode(data: bytes) -> Soup:
 
 def _corners(words: list[bytes], number: int) -> list[int]:
     try:
-        return [int(word.partition(b"/")[0]) for word in words]
+        face = [int(word.partition(b"/")[0]) for word in words]
     except ValueError as error:
         raise FormatError(f"the face in line {number} holds something that is no index ({error})") from None
+    if any(abs(index) >= 2**32 for index in face):
+        raise FormatError(f"the face in line {number} refers to a vertex beyond 2^32")
+    return face
 
 
 def encode(mesh: TriangleMesh) -> bytes:

@@ -31,10 +31,10 @@ def decode(data: bytes) -> Soup:
             "its count line is missing or malformed; it must say how many vertices, faces and edges follow"
         )
     vertex_count, face_count = int(counts[0]), int(counts[1])
-    if len(lines) - 1 < vertex_count + face_count:
+    if len(lines) - 1 != vertex_count + face_count:
+        state = "is truncated" if len(lines) - 1 < vertex_count + face_count else "goes on after its last face"
         raise FormatError(
-            f"it is truncated: it declares {vertex_count} vertices and {face_count} faces but only "
-            f"{len(lines) - 1} lines follow"
+            f"it {state}: it declares {vertex_count} vertices and {face_count} faces, and {len(lines) - 1} lines follow"
         )
     rows = lines[1 : 1 + vertex_count]
     if any(len(row) < 3 for row in rows):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class _Lists(NamedTuple):
     """A column of lists: their lengths, and all their items one after another."""
 
     sizes: NDArray[np.int64]
-    items: NDArray[np.int64]
+    items: NDArray[Any]
 
 
 _Table = dict[str, NDArray[np.float64] | _Lists]
@@ -67,7 +67,7 @@ def decode(data: bytes) -> Soup:
     if (lists.sizes < 3).any():
         index = int(np.argmax(lists.sizes < 3))
         raise FormatError(f"face {index} has {lists.sizes[index]} corners; a face needs 3 or more")
-    return Soup(_positions(tables), fan(lists.items, lists.sizes))
+    return Soup(_positions(tables), fan(_indices(lists.items), lists.sizes))
 
 
 def decode_points(data: bytes) -> NDArray[np.float64]:
@@ -86,15 +86,20 @@ def _positions(tables: dict[str, _Table]) -> NDArray[np.float64]:
 def _tables(data: bytes) -> dict[str, _Table]:
     order, elements, body = _header(data)
     tables: dict[str, _Table] = {}
+    at = 0
     if order is None:
         tokens = body.split()
-        at = 0
         for element in elements:
             tables[element.name], at = _text_table(element, tokens, at)
+        rest = len(tokens) - at
     else:
-        at = 0
         for element in elements:
             tables[element.name], at = _binary_table(element, body, at, order)
+        rest = len(body[at:].strip())
+    if rest:
+        raise FormatError(
+            f"it goes on after the last element it declares ({rest} {'bytes' if order else 'numbers'} more)"
+        )
     return tables
 
 
@@ -115,7 +120,8 @@ def _header(data: bytes) -> tuple[str | None, list[_Element], bytes]:
             if words[:1] == ["format"]:
                 order = None if words[1] == "ascii" else _ORDERS[words[1]]
             elif words[:1] == ["element"]:
-                elements.append(_Element(words[1], int(words[2]), []))
+                _, name, rows = words
+                elements.append(_Element(name, int(rows), []))
             elif words[:2] == ["property", "list"]:
                 elements[-1].properties.append(_Property(words[4], _TYPES[words[3]], _COUNTS[words[2]]))
             elif words[:1] == ["property"]:
@@ -223,11 +229,16 @@ def _walk(element: _Element, body: bytes, at: int, order: str) -> tuple[_Table, 
     return table, at
 
 
-def _lists(sizes: list[int], values: NDArray[np.generic]) -> _Lists:
-    whole = values.astype(np.int64)
-    if not np.array_equal(whole, values):
-        raise FormatError("a list of vertex indices holds something that is no whole number")
-    return _Lists(np.array(sizes, dtype=np.int64), whole)
+def _lists(sizes: list[int], values: NDArray[Any]) -> _Lists:
+    return _Lists(np.array(sizes, dtype=np.int64), values)
+
+
+def _indices(items: NDArray[Any]) -> NDArray[np.int64]:
+    with np.errstate(invalid="ignore"):
+        whole = items.astype(np.int64)
+    if not np.array_equal(whole, items):
+        raise FormatError("a face's list of vertices holds something that is no whole number")
+    return whole
 
 
 def _size(element: _Element, token: bytes) -> int:

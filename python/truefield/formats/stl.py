@@ -18,7 +18,7 @@ _FACET: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("at
 def decode(data: bytes) -> Soup:
     """Reads either kind; which one is told by the size, since binary files may begin with `solid` too."""
     count = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else -1
-    if len(data) == _HEADER + count * _FACET.itemsize:
+    if count >= 0 and len(data) == _HEADER + count * _FACET.itemsize:
         corners = np.frombuffer(data, dtype=_FACET, offset=_HEADER)["corners"].astype(np.float64)
     elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
         corners = _decode_text(data)
