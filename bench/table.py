@@ -1,0 +1,52 @@
+"""Markdown tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bench.compare import BAND_CELLS, Result
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table whose columns line up; all but the first are aligned right."""
+    widths = [max(len(cell) for cell in column) for column in zip(head, *rows, strict=True)]
+
+    def line(cells: Sequence[str]) -> str:
+        padded = [c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(cells, widths, strict=True))]
+        return "| " + " | ".join(padded) + " |"
+
+    rule = "|" + "|".join(("-" * (w + 2)) if i == 0 else "-" * (w + 1) + ":" for i, w in enumerate(widths)) + "|"
+    return "\n".join([line(head), rule, *(line(row) for row in rows)])
+
+
+def seconds(value: float) -> str:
+    """A time in the unit that fits."""
+    return f"{value:.2f} s" if value >= 1 else f"{value * 1e3:.1f} ms"
+
+
+def comparison(result: Result) -> str:
+    """All tools in one job on one model."""
+    titles = {
+        "dense": f"dense signed grid {_times(result.shape)}",
+        "winding": f"dense signed grid {_times(result.shape)}, sign by winding number",
+        "band": f"band of {BAND_CELLS} cells in a grid {_times(result.shape)}",
+        "uniform": "random queries in and around the box",
+        "near": "random queries near the surface",
+    }
+    unit, name = (result.spacing, "error (cells)") if result.job == "band" else (result.diagonal, "error (of diagonal)")
+    head = ["tool", "build + query", "of it build", "ns/sample", "ratio", name, "wrong signs", "peak MiB"]
+    rows = []
+    for row in result.rows:
+        if row.error:
+            rows.append([row.tool, row.error, *([""] * 6)])
+            continue
+        wrong = f"{'~' if row.estimated else ''}{row.wrong_signs:.0f}"
+        rows.append([
+            row.tool, seconds(row.seconds), seconds(row.build), f"{row.per_sample:.1f}", f"{row.ratio:.2f}",
+            f"{row.largest_error / unit:.1e}", wrong, f"{row.memory:.0f}",
+        ])  # fmt: skip
+    return f"### {result.model} ({result.triangles} triangles): {titles[result.job]}\n\n{markdown(head, rows)}\n"
+
+
+def _times(shape: tuple[int, int, int]) -> str:
+    return " x ".join(str(n) for n in shape)
