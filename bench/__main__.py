@@ -15,22 +15,18 @@ from typing import Any
 
 import numpy as np
 
-from bench import models, peers, table
-from bench.compare import Settings, compare
+from bench import alone, models, peers, process, table
+from bench.compare import compare
+from bench.settings import Settings
 
 COMPARED = ("dense", "winding", "band", "uniform", "near")
+ALL = (*COMPARED, *alone.JOBS)
 
 
 def main() -> None:
     arguments = _arguments()
-    jobs = arguments.jobs.split(",") if arguments.jobs else list(COMPARED)
-    unknown = sorted(set(jobs) - set(COMPARED))
-    if unknown:
-        sys.exit(f"error: no job is called {unknown[0]!r}; choose from {', '.join(COMPARED)}")
-    tools = arguments.tools.split(",") if arguments.tools else []
-    strange = sorted(set(tools) - set(peers.ALL))
-    if strange:
-        sys.exit(f"error: no tool is called {strange[0]!r}; choose from {', '.join(peers.ALL)}")
+    jobs = _chosen("job", arguments.jobs, ALL) or list(ALL)
+    tools = _chosen("tool", arguments.tools, tuple(peers.ALL))
     settings = Settings(
         resolution=arguments.resolution, queries=arguments.queries, repeats=arguments.repeats,
         threads=arguments.threads, timeout=arguments.timeout, tools=tools,
@@ -43,16 +39,37 @@ def main() -> None:
     results: list[Any] = []
     numbers = {"machine": machine, "settings": asdict(settings), "results": results}
     _say(report, "\n".join(f"- {key}: {value}" for key, value in machine.items()) + "\n")
+
+    def keep(text: str, result: dict[str, Any]) -> None:
+        """After every job, so that an interrupted run keeps what it measured."""
+        results.append(result)
+        _say(report, text)
+        stem.with_suffix(".json").write_text(json.dumps(numbers, indent=1))
+        stem.with_suffix(".md").write_text("\n".join(report))
+
     for mesh in models.models(arguments.models, arguments.only.split(",") if arguments.only else []):
+        vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles, dtype=np.int64)
         for job in jobs:
-            vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles, dtype=np.int64)
-            result = compare(job, mesh.name, vertices, triangles, settings)
-            results.append(asdict(result))
-            _say(report, table.comparison(result))
-            # After every job, so that an interrupted run keeps what it measured.
-            stem.with_suffix(".json").write_text(json.dumps(numbers, indent=1))
-            stem.with_suffix(".md").write_text("\n".join(report))
+            if job in COMPARED:
+                compared = compare(job, mesh.name, vertices, triangles, settings)
+                keep(table.comparison(compared), asdict(compared))
+            elif job in alone.WITH_MODEL:
+                made = process.table(job, settings, mesh.name, vertices, triangles)
+                keep(table.plain(made), made)
+    for job in jobs:
+        if job not in (*COMPARED, *alone.WITH_MODEL):
+            made = process.table(job, settings)
+            keep(table.plain(made), made)
     print(f"Kept in {stem}.md and {stem}.json")
+
+
+def _chosen(what: str, given: str | None, known: tuple[str, ...]) -> list[str]:
+    """The words of an option, each a known one."""
+    words = given.split(",") if given else []
+    for word in words:
+        if word not in known:
+            sys.exit(f"error: no {what} is called {word!r}; choose from {', '.join(known)}")
+    return words
 
 
 def _say(report: list[str], text: str) -> None:
@@ -64,7 +81,7 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m bench", description="Compares truefield with its peers.")
     parser.add_argument("--models", type=Path, help="a folder of meshes; without it, shapes that truefield makes")
     parser.add_argument("--only", help="words, comma separated: only models whose name holds one")
-    parser.add_argument("--jobs", help=f"comma separated, of {', '.join(COMPARED)} (default: all)")
+    parser.add_argument("--jobs", help=f"comma separated, of {', '.join(ALL)} (default: all)")
     parser.add_argument("--tools", help=f"comma separated, of {', '.join(peers.ALL)} (default: all)")
     parser.add_argument("--resolution", type=int, default=256, help="samples along the longest side (default: 256)")
     parser.add_argument("--queries", type=int, default=1_000_000, help="random points (default: a million)")

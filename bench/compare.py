@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +14,10 @@ from numpy.typing import NDArray
 from bench import peers, process
 from bench.judge import Judge
 from bench.lattice import Floats, Lattice
+from bench.settings import Settings
 from bench.verdict import verdicts
 
 BAND_CELLS = 3
-
-
-@dataclass
-class Settings:
-    """How a run is made."""
-
-    resolution: int = 256
-    queries: int = 1_000_000
-    repeats: int = 3
-    threads: int = 2
-    timeout: float = 1800.0
-    tools: list[str] = field(default_factory=list)
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""The lattice of sample points that every tool fills: the centres of cubic cells over a mesh's box."""
+"""The lattice of sample points that every tool fills."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Lattice:
 
     @staticmethod
     def over(vertices: Floats, resolution: int) -> Lattice:
-        """Cells centred on the box of the vertices, `resolution` of them along its longest side."""
+        """Centred on the box of the vertices, `resolution` samples from end to end of its longest side."""
         low, high = vertices.min(axis=0), vertices.max(axis=0)
-        spacing = float((high - low).max()) / resolution
-        shape = np.maximum(np.ceil((high - low) / spacing - 1e-9), 1).astype(int)
-        first = (low + high) / 2 - shape * (spacing / 2) + spacing / 2
+        spacing = float((high - low).max()) / (resolution - 1)
+        shape = np.ceil((high - low) / spacing + 1 - 1e-9).astype(int)
+        first = (low + high) / 2 - (shape - 1) * spacing / 2
         x, y, z = (float(value) for value in first)
         return Lattice((x, y, z), spacing, (int(shape[0]), int(shape[1]), int(shape[2])))
 

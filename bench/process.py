@@ -6,8 +6,14 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bench.settings import Settings
 
 ROOT = Path(__file__).resolve().parent.parent
 # Each library reads its own.
@@ -35,6 +41,20 @@ def run(task: dict[str, Any], folder: Path, timeout: float) -> dict[str, Any]:
         return result
     lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]
     return {"error": lines[-1][:200]}
+
+
+def table(job: str, settings: Settings, model: str = "", *mesh: NDArray[Any]) -> dict[str, Any]:
+    """A job that only truefield does, on a mesh if it takes one."""
+    with tempfile.TemporaryDirectory(prefix="truefield-bench-") as text:
+        folder = Path(text)
+        if mesh:
+            np.savez(folder / "mesh.npz", vertices=mesh[0], triangles=mesh[1])
+        task = {
+            "job": job, "mesh": str(folder / "mesh.npz") if mesh else None,
+            "threads": settings.threads, "repeats": settings.repeats,
+        }  # fmt: skip
+        made = run(task, folder, settings.timeout)
+        return made | {"job": job, "model": f"{model}: " if model else ""}
 
 
 def _pinned(threads: int) -> str:

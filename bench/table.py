@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from bench.compare import BAND_CELLS, Result
 
@@ -46,6 +47,13 @@ def comparison(result: Result) -> str:
             f"{row.largest_error / unit:.1e}", wrong, f"{row.memory:.0f}",
         ])  # fmt: skip
     return f"### {result.model} ({result.triangles} triangles): {titles[result.job]}\n\n{markdown(head, rows)}\n"
+
+
+def plain(made: dict[str, Any]) -> str:
+    """A table that only truefield fills."""
+    if "error" in made:
+        return f"### {made['job']}: {made['error']}\n"
+    return f"### {made['model']}{made['title']}\n\n{markdown(made['head'], made['rows'])}\n"
 
 
 def _times(shape: tuple[int, int, int]) -> str:

@@ -44,10 +44,10 @@ def test_judge_culls_nothing_that_is_nearest() -> None:
     np.testing.assert_allclose(judge.distance(points), np.min(alone, axis=0), rtol=0, atol=0)
 
 
-def test_lattice_centres_its_cells() -> None:
-    lattice = Lattice.over(np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 1.5]]), 8)
-    assert (lattice.spacing, lattice.shape) == (0.5, (8, 4, 3))
-    assert lattice.first == (0.25, 0.25, 0.25)
+def test_lattice_reaches_from_end_to_end() -> None:
+    lattice = Lattice.over(np.array([[0.0, 0.0, 0.0], [4.0, 2.0, 1.25]]), 9)
+    assert (lattice.spacing, lattice.shape) == (0.5, (9, 5, 4))
+    assert lattice.first == (0.0, 0.0, -0.125)
     rows = np.arange(len(lattice))
     slabs = np.concatenate([points for _, points in lattice.slabs(20)])
     np.testing.assert_array_equal(slabs, lattice.points(rows))

@@ -31,12 +31,9 @@ class _Surface(Solver):
     def _sample(self, lattice: Lattice, band: float | None, clock: Clock, values: NDArray[Any] | None) -> None:
         with clock:
             sampled = self.surface.sample(resolution=max(lattice.shape), band=band, threads=self.threads)
-        if sampled.values.shape != lattice.shape or not np.isclose(
-            sampled.spacing, lattice.spacing, rtol=1e-12, atol=0
-        ):
-            raise ValueError(
-                f"samples {sampled.values.shape} at {sampled.spacing}, expected {lattice.shape} at {lattice.spacing}"
-            )
+        here, there = [*sampled.origin, sampled.spacing], [*lattice.first, lattice.spacing]
+        if sampled.shape != lattice.shape or not np.allclose(here, there, rtol=1e-12, atol=1e-12 * lattice.spacing):
+            raise ValueError(f"samples {sampled.shape} from {sampled.origin}, expected {lattice}")
         if values is not None:
             values[:] = np.where(np.isfinite(sampled.values), sampled.values, np.nan).reshape(-1)
             if band is not None:
