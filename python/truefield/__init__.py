@@ -4,15 +4,22 @@ from truefield import shapes
 from truefield._truefield import __version__
 from truefield.cloud import PointCloud
 from truefield.errors import FileError, TruefieldError
+from truefield.fields import CompleteField, Nearest, SampledField, SignRule, Surface, complete_field
 from truefield.io import read, read_points
 from truefield.mesh import TriangleMesh
 
 __all__ = [
+    "CompleteField",
     "FileError",
+    "Nearest",
     "PointCloud",
+    "SampledField",
+    "SignRule",
+    "Surface",
     "TriangleMesh",
     "TruefieldError",
     "__version__",
+    "complete_field",
     "read",
     "read_points",
     "shapes",

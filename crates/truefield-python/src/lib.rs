@@ -1,8 +1,17 @@
 //! The Python extension module `truefield._truefield`: convert, one door, convert back.
 
+mod convert;
+mod door;
+mod field;
+mod surface;
+
 use pyo3::prelude::*;
 
 #[pymodule]
 fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add("__version__", env!("CARGO_PKG_VERSION"))
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<surface::PySurface>()?;
+    module.add_class::<field::PyCompleteField>()?;
+    module.add_class::<field::PySampledField>()?;
+    Ok(())
 }

@@ -1,0 +1,385 @@
+"""Shapes and fields that answer: how far is it from here?
+
+Distances are in model units and negative inside. Points are (n, 3) float64, x y z; a single point may be given as (3,).
+Every answer is exact to rounding in double precision; `bounds` gives the guarantee.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truefield import _truefield
+from truefield.errors import TruefieldError
+from truefield.mesh import TriangleMesh
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+Sign = Literal["auto", "pseudonormal", "winding", "unsigned"]
+Region = Literal["everywhere", "inside"]
+Part = Union[TriangleMesh, "Surface"]
+
+_MOST_CELLS_ALONG_A_SIDE = 2**31
+
+
+@dataclass(frozen=True, slots=True)
+class SignRule:
+    """The rule that decides which side of the surface a point is on, and why it was chosen."""
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest:
+    """Nearest points of a surface, one row for each point asked.
+
+    Attributes:
+        distance: (n,) float64 signed distance, model units, negative inside.
+        point: (n, 3) float64 nearest point of the surface.
+        triangle: (n,) int64 triangle that holds it; the lowest index where several tie.
+        feature: (n,) uint8 where on the triangle it lies: 0 face, 1 to 3 edge, 4 to 6 vertex (the papers' cases C1, C2, C3).
+        normal: (n, 3) float64 unit gradient of the signed distance: the face normal in case C1, the direction from the
+            nearest point in cases C2 and C3, turned outward.
+    """
+
+    distance: Floats
+    point: Floats
+    triangle: NDArray[np.int64]
+    feature: NDArray[np.uint8]
+    normal: Floats
+
+
+class _Answering:
+    """What surfaces and complete fields share: the four questions."""
+
+    __slots__ = ("_native",)
+    _native: _truefield.Surface | _truefield.CompleteField
+
+    def distance(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Floats:
+        """Signed distances, (n,) float64, exact to rounding; the better guess of a side where it is doubtful.
+
+        Raises:
+            TruefieldError: the points are not (n, 3) finite numbers.
+        """
+        return self._native.distance(_points(points), threads, progress)
+
+    def bounds(
+        self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None
+    ) -> tuple[Floats, Floats]:
+        """Lower and upper bounds, (n,) float64 each, of the true signed distances.
+
+        They are equal where the answer is exact, and `(-u, +u)` where the side cannot be decided.
+        """
+        return self._native.bounds(_points(points), threads, progress)
+
+    def nearest(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Nearest:
+        """The nearest point of the surface for every point."""
+        return Nearest(*self._native.nearest(_points(points), threads, progress))
+
+    def gradient(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Floats:
+        """(n, 3) float64 unit gradients of the signed distance: the `normal` of `nearest`."""
+        return self.nearest(points, threads=threads, progress=progress).normal
+
+
+class Surface(_Answering):
+    """A triangle mesh ready to be asked: tree and sign rule.
+
+    Args:
+        mesh: the part.
+        sign: "auto" takes angle-weighted pseudonormals (Baerentzen and Aanaes 2005) where they are proven for the mesh and
+            the generalised winding number (Jacobson et al. 2013) everywhere else; or name the rule yourself;
+            "unsigned" gives positive distances everywhere.
+        threads: worker threads, all cores by default; results never depend on it.
+        progress: called as `progress(phase, fraction)`.
+
+    Building takes O(m log m) for m triangles, about a microsecond a triangle. A query takes about a microsecond.
+
+    Raises:
+        TruefieldError: the mesh or an argument cannot be used.
+    """
+
+    __slots__ = ("_mesh",)
+    _native: _truefield.Surface
+
+    def __init__(
+        self, mesh: TriangleMesh, sign: Sign = "auto", *, threads: int | None = None, progress: Progress | None = None
+    ) -> None:
+        """Builds the tree and finds the sign rule."""
+        if not isinstance(mesh, TriangleMesh):
+            raise TruefieldError(
+                f"a Surface is made from a TriangleMesh, not from {type(mesh).__name__}; read it first"
+            )
+        self._mesh = mesh
+        self._native = _truefield.Surface(mesh.vertices, mesh.triangles, sign, threads, progress)
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The part."""
+        return self._mesh
+
+    @property
+    def sign_rule(self) -> SignRule:
+        """Which rule decides sides, and why."""
+        return SignRule(*self._native.sign_rule)
+
+    def sample(
+        self,
+        resolution: int | None = None,
+        spacing: float | None = None,
+        *,
+        band: float | None = None,
+        margin: float = 0.0,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> SampledField:
+        """Samples the signed distance on a lattice of points over the box of the part, exact at every sample.
+
+        Args:
+            resolution: samples along the longest side of the box (default 256), or
+            spacing: distance of neighbouring samples, model units.
+            band: keep |distance| <= band only; farther samples hold plus or minus the band.
+            margin: the box is grown by this on all sides, model units.
+            memory: refuse to take more bytes than this; half the machine's memory by default.
+            threads: worker threads.
+            progress: called as `progress(phase, fraction)`.
+
+        Takes 4 bytes a sample and, coherent as it is, some tens of nanoseconds a sample and thread.
+        """
+        low, high = self._mesh.extent
+        low, high = low - _length("margin", margin, least=0.0), high + margin
+        if resolution is not None and spacing is not None:
+            raise TruefieldError("give resolution or spacing, not both")
+        if spacing is None:
+            count = _count("resolution", 256 if resolution is None else resolution, least=2)
+            spacing = float(np.max(high - low)) / (count - 1)
+        step = _length("spacing", spacing)
+        shape = _shape((high - low) / step + 1.0, step)
+        origin = (low + high) / 2 - (np.asarray(shape) - 1) * step / 2
+        native = _truefield.SampledField(
+            self._native, origin.tolist(), step, shape, band, _memory(memory), threads, progress
+        )
+        return SampledField(native)
+
+
+class CompleteField(_Answering):
+    """For every cell of a grid, each triangle that can be nearest inside it: exact everywhere, for any resolution.
+
+    Huang, Li, Crawfis, Lu, Liou: A Complete Distance Field Representation, 2001, with tighter lists and storage.
+    Make one with `complete_field`. Points outside the grid are answered by the surface, as exactly.
+    """
+
+    __slots__ = ("_surface",)
+    _native: _truefield.CompleteField
+
+    def __init__(self, native: _truefield.CompleteField, surface: Surface) -> None:
+        """Wraps the compiled field; `complete_field` is the way to make one."""
+        self._native = native
+        self._surface = surface
+
+    @property
+    def surface(self) -> Surface:
+        """The surface it was built from."""
+        return self._surface
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The part."""
+        return self._surface.mesh
+
+    @property
+    def sign_rule(self) -> SignRule:
+        """Which rule decides sides, and why."""
+        return self._surface.sign_rule
+
+    @property
+    def origin(self) -> Floats:
+        """(3,) lower corner of the grid, model units."""
+        return np.array(self._native.grid[0])
+
+    @property
+    def cell_size(self) -> float:
+        """Edge of a cell, model units."""
+        return self._native.grid[1]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of cells along x, y and z."""
+        return self._native.grid[2]
+
+    @property
+    def region(self) -> str:
+        """ "everywhere", or "inside" when only surface and inside cells hold lists."""
+        return self._native.region
+
+    def statistics(self) -> dict[str, float]:
+        """Counts as in the paper's Tables 2 to 4.
+
+        Cells inside, on the surface and outside; cells listed, and those with lists too long to keep; mean lengths of the
+        lists; bytes of lists and cells, and the bytes the paper's layout (4 n + 5 for n triangles in a cell) takes.
+        """
+        return self._native.statistics()
+
+    def sample(
+        self,
+        resolution: int | None = None,
+        spacing: float | None = None,
+        *,
+        band: float | None = None,
+        margin: float = 0.0,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> SampledField:
+        """Samples the signed distance on a lattice; see `Surface.sample`."""
+        return self._surface.sample(
+            resolution, spacing, band=band, margin=margin, memory=memory, threads=threads, progress=progress
+        )
+
+
+def complete_field(
+    part: Part,
+    resolution: int | None = None,
+    cell_size: float | None = None,
+    *,
+    region: Region = "everywhere",
+    memory: int | None = None,
+    sign: Sign = "auto",
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> CompleteField:
+    """Builds the complete distance field of a part over its box.
+
+    Args:
+        part: a mesh, or a surface that is ready already.
+        resolution: cells along the longest side (default 128), or
+        cell_size: edge of a cell, model units.
+        region: "everywhere", or "inside" for surface and inside cells only, as the paper does.
+        memory: the lists take at most this many bytes; where they would take more, the longest give way to a search
+            of the tree, which stays exact. Half the machine's memory by default.
+        sign: the sign rule of the surface; see `Surface`.
+        threads: worker threads.
+        progress: called as `progress(phase, fraction)`.
+
+    Raises:
+        TruefieldError: an argument cannot be used.
+        MemoryError: even the empty grid would not fit the budget.
+    """
+    surface = part if isinstance(part, Surface) else Surface(part, sign, threads=threads, progress=progress)
+    low, high = surface.mesh.extent
+    if resolution is not None and cell_size is not None:
+        raise TruefieldError("give resolution or cell_size, not both")
+    if cell_size is None:
+        cell_size = float(np.max(high - low)) / _count("resolution", 128 if resolution is None else resolution, least=1)
+    edge = _length("cell_size", cell_size)
+    shape = _shape(np.ceil((high - low) / edge - 1e-9), edge)
+    origin = (low + high) / 2 - np.asarray(shape) * edge / 2
+    native = _truefield.CompleteField(
+        surface._native, origin.tolist(), edge, shape, region, _memory(memory), threads, progress
+    )
+    return CompleteField(native, surface)
+
+
+class SampledField:
+    """Signed distances at lattice points, each exact and rounded to single precision; made by `Surface.sample`.
+
+    Node-centred: sample [i, j, k] lies at `origin + spacing * (i, j, k)`. Between samples values are interpolated
+    trilinearly; `bounds` encloses the truth there too.
+    """
+
+    __slots__ = ("_native",)
+
+    def __init__(self, native: _truefield.SampledField) -> None:
+        """Wraps the compiled field."""
+        self._native = native
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """(x, y, z) float32 signed distances; read-only, not a copy."""
+        return self._native.values
+
+    @property
+    def lower(self) -> NDArray[np.float32]:
+        """(x, y, z) float32, never above the true distance; a fresh array."""
+        return self._native.lower
+
+    @property
+    def upper(self) -> NDArray[np.float32]:
+        """(x, y, z) float32, never below the true distance; a fresh array."""
+        return self._native.upper
+
+    @property
+    def origin(self) -> Floats:
+        """(3,) position of sample [0, 0, 0], model units."""
+        return np.array(self._native.lattice[0])
+
+    @property
+    def spacing(self) -> float:
+        """Distance of neighbouring samples, model units, the same along all axes."""
+        return self._native.lattice[1]
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of samples along x, y and z."""
+        return self._native.lattice[2]
+
+    def distance(self, points: ArrayLike) -> Floats:
+        """(n,) float64 trilinear interpolation of the samples, NaN outside the lattice; `bounds` says how good."""
+        return self._native.distance(_points(points))
+
+    def bounds(self, points: ArrayLike) -> tuple[Floats, Floats]:
+        """(n,) float64 lower and upper bounds of the true distance, from the eight samples around each point."""
+        return self._native.bounds(_points(points))
+
+
+def _points(points: ArrayLike) -> Floats:
+    try:
+        array = np.ascontiguousarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TruefieldError("points are not numbers; give an array of shape (n, 3)") from None
+    if array.ndim == 1 and array.shape[0] == 3:
+        array = array.reshape(1, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise TruefieldError(f"points have shape {array.shape}; give an array of shape (n, 3)")
+    return array
+
+
+def _count(name: str, value: int, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise TruefieldError(f"{name} is {value}; give a whole number of at least {least}")
+    return int(value)
+
+
+def _length(name: str, value: float, least: float | None = None) -> float:
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TruefieldError(f"{name} is {value!r}; give a length in model units") from None
+    if not np.isfinite(length) or (length <= 0.0 if least is None else length < least):
+        kind = "positive" if least is None else "finite, not negative"
+        raise TruefieldError(f"{name} is {value}; give a {kind} length in model units")
+    return length
+
+
+def _shape(counts: Floats, step: float) -> tuple[int, int, int]:
+    if not np.all(np.isfinite(counts)) or np.max(counts) > _MOST_CELLS_ALONG_A_SIDE:
+        raise TruefieldError(
+            f"a step of {step:g} gives {np.max(counts):.3g} cells along a side; give a coarser resolution"
+        )
+    x, y, z = (max(1, int(np.ceil(count - 1e-9))) for count in counts)
+    return x, y, z
+
+
+def _memory(memory: int | None) -> int:
+    if memory is not None:
+        return _count("memory", memory, least=0)
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+    except (AttributeError, ValueError, OSError):
+        return 4 * 2**30
