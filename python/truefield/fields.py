@@ -43,7 +43,8 @@ class Nearest:
         distance: (n,) float64 signed distance, model units, negative inside.
         point: (n, 3) float64 nearest point of the surface.
         triangle: (n,) int64 triangle that holds it; the lowest index where several tie.
-        feature: (n,) uint8 where on the triangle it lies: 0 face, 1 to 3 edge, 4 to 6 vertex (the papers' cases C1, C2, C3).
+        feature: (n,) uint8 where on the triangle it lies: 0 face, 1 to 3 edge, 4 to 6 vertex: the papers'
+            cases C1, C2, C3.
         normal: (n, 3) float64 unit gradient of the signed distance: the face normal in case C1, the direction from the
             nearest point in cases C2 and C3, turned outward.
     """
@@ -92,8 +93,8 @@ class Surface(_Answering):
 
     Args:
         mesh: the part.
-        sign: "auto" takes angle-weighted pseudonormals (Baerentzen and Aanaes 2005) where they are proven for the mesh and
-            the generalised winding number (Jacobson et al. 2013) everywhere else; or name the rule yourself;
+        sign: "auto" takes angle-weighted pseudonormals (Baerentzen and Aanaes 2005) where they are proven for the mesh
+            and the generalised winding number (Jacobson et al. 2013) everywhere else; or name the rule yourself;
             "unsigned" gives positive distances everywhere.
         threads: worker threads, all cores by default; results never depend on it.
         progress: called as `progress(phase, fraction)`.
@@ -221,8 +222,8 @@ class CompleteField(_Answering):
     def statistics(self) -> dict[str, float]:
         """Counts as in the paper's Tables 2 to 4.
 
-        Cells inside, on the surface and outside; cells listed, and those with lists too long to keep; mean lengths of the
-        lists; bytes of lists and cells, and the bytes the paper's layout (4 n + 5 for n triangles in a cell) takes.
+        Cells inside, on the surface and outside; cells listed, and those with lists too long to keep; mean lengths of
+        the lists; bytes of lists and cells, and the bytes the paper's layout (4 n + 5 for n triangles in a cell) takes.
         """
         return self._native.statistics()
 

@@ -27,9 +27,7 @@ pub fn sign_choice(name: &str) -> PyResult<SignChoice> {
         "winding" => SignChoice::Winding,
         "unsigned" => SignChoice::Unsigned,
         _ => {
-            return Err(raise(Error::invalid(format!(
-                "sign is {name:?}; choose \"auto\", \"pseudonormal\", \"winding\" or \"unsigned\""
-            ))));
+            return Err(raise(Error::invalid(format!("sign is {name:?}; choose \"auto\", \"pseudonormal\", \"winding\" or \"unsigned\""))));
         }
     })
 }
