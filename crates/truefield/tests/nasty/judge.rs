@@ -1,7 +1,9 @@
-//! An independent judge of point-triangle distance: exact integers, and regions instead of candidates.
+//! Independent judges in exact integers: the distance to a triangle by regions instead of candidates,
+//! and the winding number of a watertight mesh by crossings instead of angles.
 
 use num_bigint::{BigInt, Sign};
-use truefield::DVec3;
+use truefield::laws::Random;
+use truefield::{DVec3, TriangleMesh};
 
 type Exact = [BigInt; 3];
 
@@ -11,9 +13,7 @@ type Exact = [BigInt; 3];
 /// region of `p` decides what is nearest (Ericson, Real-Time Collision Detection, 5.1.5), and the
 /// squared distance is a ratio of two integers: |w|^2, |w x ab|^2 / |ab|^2 or (w . n)^2 / |n|^2.
 pub fn distance([a, b, c]: [DVec3; 3], p: DVec3) -> f64 {
-    let numbers = [a, b, c, p].map(|v| v.to_array().map(split));
-    let unit = numbers.iter().flatten().filter(|(m, _)| *m != 0).map(|&(_, e)| e).min().unwrap_or(0);
-    let [a, b, c, p] = numbers.map(|v| v.map(|(m, e)| if m == 0 { BigInt::ZERO } else { BigInt::from(m) << (e - unit) as u64 }));
+    let ([a, b, c, p], unit) = integers([a, b, c, p]);
     let (ab, ac, ap) = (minus(&b, &a), minus(&c, &a), minus(&p, &a));
     let (bp, cp, bc) = (minus(&p, &b), minus(&p, &c), minus(&c, &b));
     let n = cross(&ab, &ac);
@@ -59,6 +59,68 @@ pub fn distance([a, b, c]: [DVec3; 3], p: DVec3) -> f64 {
     }
     let height = dot(&ap, &n);
     root(&height * &height, dot(&n, &n))
+}
+
+/// How often a watertight mesh winds around `p`; `None` if `p` lies on it.
+///
+/// Counts the oriented crossings of the way from `p` to a far point, every one decided by the exact
+/// signs of volumes; a way that touches an edge is given up for another.
+pub fn winding(mesh: &TriangleMesh, p: DVec3) -> Option<i32> {
+    let mut random = Random::new(1);
+    let extent = mesh.extent();
+    let reach = extent.diagonal() + (p - extent.center()).length();
+    'ways: for _ in 0..16 {
+        let far = p + random.direction() * (3.0 * reach);
+        let mut winding = 0;
+        for triangle in 0..mesh.triangles().len() as u32 {
+            let [a, b, c] = mesh.corners(triangle);
+            let (below, above) = (side([a, b, c], p), side([a, b, c], far));
+            if below == 0 || above == 0 {
+                // In line with the triangle's plane: it matters only if the way could touch it.
+                let corners = [side([p, far, a], b), side([p, far, b], c), side([p, far, c], a)];
+                if corners.iter().all(|&s| s >= 0) || corners.iter().all(|&s| s <= 0) {
+                    continue 'ways;
+                }
+                continue;
+            }
+            if below == above {
+                continue;
+            }
+            let edges = [side([p, far, a], b), side([p, far, b], c), side([p, far, c], a)];
+            if edges.iter().all(|&s| s > 0) || edges.iter().all(|&s| s < 0) {
+                // From inside out, against the normal's back: below the plane first.
+                winding -= below;
+            } else if !(edges.contains(&1) && edges.contains(&-1)) {
+                continue 'ways;
+            }
+        }
+        return Some(winding);
+    }
+    None
+}
+
+/// The exact sign of the volume of the tetrahedron `a b c d`: 1 if `d` lies above the triangle.
+fn side([a, b, c]: [DVec3; 3], d: DVec3) -> i32 {
+    let (u, v, w) = (b - a, c - a, d - a);
+    let volume = u.cross(v).dot(w);
+    // Rounding of differences, products and sums, generously.
+    let error = 1e-14 * u.abs().element_sum() * v.abs().element_sum() * w.abs().element_sum();
+    if volume.abs() > error && error > 1e-280 {
+        return if volume > 0.0 { 1 } else { -1 };
+    }
+    let ([a, b, c, d], _) = integers([a, b, c, d]);
+    match dot(&cross(&minus(&b, &a), &minus(&c, &a)), &minus(&d, &a)).sign() {
+        Sign::Minus => -1,
+        Sign::NoSign => 0,
+        Sign::Plus => 1,
+    }
+}
+
+/// Points as integers over one power of two.
+fn integers<const N: usize>(points: [DVec3; N]) -> ([Exact; N], i32) {
+    let numbers = points.map(|v| v.to_array().map(split));
+    let unit = numbers.iter().flatten().filter(|(m, _)| *m != 0).map(|&(_, e)| e).min().unwrap_or(0);
+    (numbers.map(|v| v.map(|(m, e)| if m == 0 { BigInt::ZERO } else { BigInt::from(m) << (e - unit) as u64 })), unit)
 }
 
 /// `x = m * 2^e` with an integer `m`.

@@ -191,8 +191,10 @@ impl Distance for Surface {
 impl Closest for Surface {
     fn nearest(&self, p: DVec3, within: f64) -> Option<Nearest> {
         let p = p * self.scale;
-        let found = self.tree.nearest(p, Candidate::within(within * self.scale));
-        found.found().then(|| self.describe(p, found))
+        // The search compares squares, whose rounding must not decide at the limit itself.
+        let found = self.tree.nearest(p, Candidate::within(within * self.scale * (1.0 + 1e-15)));
+        let nearest = found.found().then(|| self.describe(p, found));
+        nearest.filter(|nearest| nearest.distance.abs() <= within)
     }
 }
 
