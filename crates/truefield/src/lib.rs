@@ -25,4 +25,4 @@ pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
 pub use grid::Grid;
 pub use mesh::TriangleMesh;
 pub use run::{Cancel, Progress, Run, Silent};
-pub use source::mesh::{SignChoice, SignKind, SignRule, Surface};
+pub use source::mesh::{Check, Found, SignChoice, SignKind, SignRule, Surface};

@@ -69,6 +69,22 @@ fn sphere(rings: usize, sectors: usize, skip: usize) -> Soup {
     soup
 }
 
+/// Star-shaped, with spikes, saddles and thin wedges.
+fn hedgehog() -> Soup {
+    let mut soup = sphere(16, 21, 0);
+    for v in soup.iter_mut().flatten() {
+        // The same for every copy of a vertex.
+        let mut r = random(
+            (v.x * 1e6).round() as i64 as u64 ^ ((v.y * 1e6).round() as i64 as u64) << 20 ^ ((v.z * 1e6).round() as i64 as u64) << 40,
+        );
+        for _ in 0..3 {
+            r();
+        }
+        *v *= 0.2 + r();
+    }
+    soup
+}
+
 /// The winding number, triangle by triangle.
 fn winding(soup: &[[DVec3; 3]], p: DVec3) -> f64 {
     let mut sum = 0.0;
@@ -110,7 +126,7 @@ fn compare(name: &str, soup: &[[DVec3; 3]], judge: &[[DVec3; 3]], count: usize) 
             // Near a face, an edge or a corner, from very near to a tenth of the size.
             let [a, b, c] = soup[(r() * soup.len() as f64) as usize];
             let (s, t) = [(r(), r()), (r(), 0.0), (0.0, 0.0)][index % 3 + index / 3 % 2 - 1];
-            a + (b - a) * (s * (1.0 - t)) + (c - a) * t + away * size * 10f64.powf(-1.0 - 7.0 * r())
+            a + (b - a) * (s * (1.0 - t)) + (c - a) * t + away * size * 10f64.powf(-1.0 - 14.0 * r() * r())
         };
         let w = winding(judge, p);
         match side(&surface, p) {
@@ -224,24 +240,34 @@ fn closed_solids_and_what_people_do_to_them() {
     for v in needle.iter_mut().flatten() {
         *v *= DVec3::new(1.0, 1e-5, 1e-3);
     }
+    let thin: Soup = ball.iter().map(|t| t.map(|v| v * DVec3::new(1.0, 1e-2, 0.1))).collect();
+    let hedgehog = hedgehog();
     let mut two_cubes = cube();
     two_cubes.extend(moved(&cube(), 1.0, DVec3::X));
-    for (name, soup) in [
-        ("ball", ball.clone()),
-        ("overlapping", overlapping),
-        ("cavity", cavity),
-        ("filled", filled),
-        ("one flipped", one_flipped),
-        ("inside out", flipped(&ball)),
-        ("needle", needle),
-        ("two cubes that share a wall", two_cubes),
-        ("ball without a patch", ball[9..].to_vec()),
-        ("far from the origin", moved(&ball, 1.0, DVec3::new(1e6, -1e6, 1e6))),
-        ("tiny", moved(&ball, 1e-9, DVec3::ZERO)),
-        ("huge", moved(&ball, 1e9, DVec3::X * 1e9)),
+    let (proven, summed) = (SignKind::Pseudonormal, SignKind::Winding);
+    for (name, soup, kind) in [
+        ("ball", ball.clone(), proven),
+        ("overlapping", overlapping, summed),
+        ("cavity", cavity, proven),
+        ("filled", filled, summed),
+        ("one flipped", one_flipped, summed),
+        ("inside out", flipped(&ball), summed),
+        ("needle", needle, summed),
+        ("thin", thin, proven),
+        ("hedgehog", hedgehog, proven),
+        ("two cubes that share a wall", two_cubes, summed),
+        ("ball without a patch", ball[9..].to_vec(), summed),
+        ("far from the origin", moved(&ball, 1.0, DVec3::new(1e6, -1e6, 1e6)), proven),
+        ("tiny", moved(&ball, 1e-9, DVec3::ZERO), proven),
+        ("huge", moved(&ball, 1e9, DVec3::X * 1e9), proven),
     ] {
-        let open = compare(name, &soup, &soup, 40_000);
-        assert!(open < 40, "{name}: {open} of 40000 left open");
+        let rule = surface(&soup).sign_rule().clone();
+        assert_eq!(rule.kind, kind, "{name}: {}", rule.reason);
+        let open = compare(name, &soup, &soup, 15_000);
+        // Rounding hides more of what is a hundred thousand times as long as thick; far from the origin
+        // many a point near a vertex is the vertex.
+        let allowed = if name == "needle" || name == "far from the origin" { 300 } else { 30 };
+        assert!(open < allowed, "{name}: {open} of 15000 left open");
     }
 }
 
@@ -250,29 +276,29 @@ fn duplicates_count_once_or_cancel() {
     let ball = sphere(16, 21, 0);
     // Every face written twice.
     let twice: Soup = ball.iter().chain(&ball).copied().collect();
-    compare("twice", &twice, &ball, 20_000);
+    compare("twice", &twice, &ball, 8_000);
     // Some faces written twice, three times, or with their opposite.
     let mut some = ball.clone();
     some.extend_from_slice(&ball[40..60]);
     some.extend_from_slice(&ball[50..60]);
-    compare("some twice", &some, &ball, 20_000);
+    compare("some twice", &some, &ball, 8_000);
     // A baffle of zero thickness inside.
     let baffle = [[DVec3::ZERO, DVec3::X * 0.5, DVec3::Y * 0.5], [DVec3::ZERO, DVec3::Y * 0.5, DVec3::X * 0.5]];
     let mut baffled = ball.clone();
     baffled.extend(baffle);
-    compare("baffle", &baffled, &ball, 20_000);
+    compare("baffle", &baffled, &ball, 8_000);
     // Two overlapping boxes whose bottom face is the same pair of triangles: both count.
     let mut flush = cube();
     let tall: Soup = cube().iter().map(|t| t.map(|v| v * DVec3::new(1.0, 1.0, 2.0))).collect();
     flush.extend(tall.iter().copied());
-    compare("flush boxes", &flush, &tall, 20_000);
+    compare("flush boxes", &flush, &tall, 8_000);
 }
 
 #[test]
 fn open_and_one_sided_surfaces() {
     for skip in [1, 3, 8] {
         let bowl = sphere(16, 21, skip);
-        compare("bowl", &bowl, &bowl, 30_000);
+        compare("bowl", &bowl, &bowl, 10_000);
     }
     // A strip with a half turn.
     let at = |i: usize, side: f64| {
@@ -282,7 +308,7 @@ fn open_and_one_sided_surfaces() {
     };
     let moebius: Soup =
         (0..40).flat_map(|i| [[at(i, -1.0), at(i + 1, -1.0), at(i + 1, 1.0)], [at(i, -1.0), at(i + 1, 1.0), at(i, 1.0)]]).collect();
-    compare("moebius", &moebius, &moebius, 30_000);
+    compare("moebius", &moebius, &moebius, 20_000);
     // In the very plane of the rim of half a sphere w is 1/2 at the centre: nobody can say.
     let bowl = sphere(16, 20, 8);
     let centre = surface(&bowl).at(DVec3::ZERO);

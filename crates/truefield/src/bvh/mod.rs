@@ -6,6 +6,7 @@ pub(crate) mod cover;
 pub(crate) mod descend;
 pub(crate) mod evaluate;
 mod frame;
+pub(crate) mod intersect;
 mod nearest;
 mod order;
 mod tree;

@@ -1,9 +1,13 @@
 //! A triangle mesh ready to be asked: tree and sign rule.
 
+mod check;
+mod layers;
+mod pseudonormal;
 mod sign;
 
 use std::sync::Arc;
 
+pub use check::{Check, Found};
 pub use sign::{Side, SignChoice, SignKind, SignRule};
 
 use crate::bvh::{Candidate, Tree};
@@ -43,7 +47,7 @@ impl Surface {
             Arc::new(TriangleMesh::new(vertices, mesh.triangles().to_vec())?)
         };
         let tree = Tree::build(&work, run)?;
-        let signs = Signs::new(&work, sign, run)?;
+        let signs = Signs::new(&work, &tree, sign, run)?;
         Ok(Self { mesh, work, scale, tree, signs })
     }
 

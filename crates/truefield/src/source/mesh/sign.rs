@@ -1,12 +1,18 @@
 //! Which side of a mesh a point is on.
 
+use crate::bvh::Tree;
 use crate::bvh::boundary::Boundary;
+use crate::bvh::intersect::Meetings;
 use crate::bvh::winding::{Estimate, Winding};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, FacetPoint};
 use crate::mesh::TriangleMesh;
-use crate::mesh::topology::{Sets, Topology, collapsed};
+use crate::mesh::topology::Topology;
 use crate::run::Run;
+
+use super::check::Check;
+use super::layers::Layers;
+use super::pseudonormal::Pseudonormals;
 
 /// How the user wants sides to be decided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,8 +85,12 @@ impl Side {
 #[derive(Clone, Debug)]
 pub(crate) struct Signs {
     rule: SignRule,
-    /// Absent where sides are not asked for.
+    /// Where the rule is pseudonormals.
+    pseudonormals: Option<Pseudonormals>,
+    /// Absent where sides are not asked for. Decides what pseudonormals leave open.
     winding: Option<Sum>,
+    /// Whether nothing but the surface parts inside from outside.
+    parted: bool,
 }
 
 /// Winding numbers and what is known about the chain of edges that bounds the surface.
@@ -93,19 +103,40 @@ struct Sum {
 
 impl Signs {
     /// Finds the rule and prepares it. O(n log n).
-    pub fn new(mesh: &TriangleMesh, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
+    pub fn new(mesh: &TriangleMesh, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
         if choice == SignChoice::Unsigned {
             let reason = "sides were not asked for: distances are positive everywhere".into();
-            return Ok(Self { rule: SignRule { kind: SignKind::Unsigned, reason }, winding: None });
+            return Ok(Self { rule: SignRule { kind: SignKind::Unsigned, reason }, pseudonormals: None, winding: None, parted: true });
         }
         let topology = Topology::new(mesh);
         run.cancel.check()?;
-        let layers = layers(mesh, &topology);
-        let corners: Vec<[DVec3; 3]> = layers.triangles.iter().map(|&t| mesh.corners(t)).collect();
-        let winding = Winding::build(&corners, run)?;
+        let layers = Layers::new(mesh, &topology);
+        let winding = Winding::build(&layers.corners(mesh), run)?;
         let boundary = Boundary::new(mesh, &layers.boundary);
-        let rule = SignRule { kind: SignKind::Winding, reason: "winding numbers hold for every mesh".into() };
-        Ok(Self { rule, winding: Some(Sum { winding, boundary, extent: mesh.extent() }) })
+        let closed = boundary.is_empty();
+        let sum = Sum { winding, boundary, extent: mesh.extent() };
+        if choice == SignChoice::Winding {
+            let reason = "winding numbers were asked for; they hold for every mesh".into();
+            return Ok(Self {
+                rule: SignRule { kind: SignKind::Winding, reason },
+                pseudonormals: None,
+                winding: Some(sum),
+                parted: closed,
+            });
+        }
+        let proof = prove(mesh, &topology, tree, &sum.winding, run)?;
+        let (kind, reason) = match (&proof, choice) {
+            (Ok(_), _) => (SignKind::Pseudonormal, "the mesh is closed, consistently oriented and free of self-intersections".into()),
+            (Err(fault), SignChoice::Pseudonormal) => {
+                (SignKind::Pseudonormal, format!("pseudonormals were asked for, but sides are not proven on this mesh: {fault}"))
+            }
+            (Err(fault), _) => {
+                (SignKind::Winding, format!("{fault}: pseudonormals would not be proven; inside is where the winding number is above 1/2"))
+            }
+        };
+        let parted = closed && !(proof.is_err() && kind == SignKind::Pseudonormal);
+        let pseudonormals = (kind == SignKind::Pseudonormal).then(|| Pseudonormals::new(mesh, &topology, proof.as_ref().ok()));
+        Ok(Self { rule: SignRule { kind, reason }, pseudonormals, winding: Some(sum), parted })
     }
 
     /// Which rule decides, and why.
@@ -114,25 +145,49 @@ impl Signs {
     }
 
     /// The side of `p`, whose nearest point is `nearest` on `triangle`.
-    pub fn side(&self, _mesh: &TriangleMesh, p: DVec3, _nearest: &FacetPoint, _triangle: u32) -> Side {
-        match &self.winding {
-            None => Side::Outside,
-            Some(sum) => sum.side(p),
+    pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
+        let Some(sum) = &self.winding else { return Side::Outside };
+        match self.pseudonormals.as_ref().and_then(|n| n.side(mesh, p, nearest, triangle)) {
+            Some(height) if height < 0.0 => Side::Inside,
+            Some(_) => Side::Outside,
+            None => sum.side(p),
         }
     }
 
     /// The side of every point of the ball around `p`, which does not touch the surface, if they all have one.
     pub fn side_of_ball(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> Option<Side> {
         match &self.winding {
-            Some(sum) if !sum.boundary.is_empty() => sum.side_of_ball(p, radius),
-            _ => Some(self.side(mesh, p, nearest, triangle)).filter(|side| side.is_certain()),
+            Some(_) if self.parted => Some(self.side(mesh, p, nearest, triangle)).filter(|side| side.is_certain()),
+            // Pseudonormals that are not proven may change their mind anywhere.
+            Some(sum) => self.pseudonormals.is_none().then(|| sum.side_of_ball(p, radius)).flatten(),
+            None => Some(Side::Outside),
         }
     }
 
     /// Whether the side can change at the surface only.
     pub fn changes_at_surface_only(&self) -> bool {
-        self.winding.as_ref().is_none_or(|sum| sum.boundary.is_empty())
+        self.parted
     }
+}
+
+/// Proves pseudonormals for the mesh, cheap conditions first, or says what is in the way.
+fn prove(
+    mesh: &TriangleMesh,
+    topology: &Topology,
+    tree: &Tree,
+    winding: &Winding,
+    run: &Run<'_>,
+) -> Result<std::result::Result<Meetings, String>> {
+    let mut check = Check::of_edges(mesh, topology);
+    if let Some(fault) = check.fault() {
+        return Ok(Err(fault));
+    }
+    check.add_shells(mesh, topology, winding, run)?;
+    if let Some(fault) = check.fault() {
+        return Ok(Err(fault));
+    }
+    let meetings = check.add_intersections(mesh, topology, tree, 1, run)?;
+    Ok(check.fault().map_or(Ok(meetings), Err))
 }
 
 impl Sum {
@@ -173,66 +228,4 @@ fn hopeless(e: Estimate) -> bool {
 
 fn guess(e: Estimate) -> Side {
     if e.value.abs() > 0.5 { Side::PerhapsInside } else { Side::PerhapsOutside }
-}
-
-/// What the winding sum runs over.
-struct Layers {
-    triangles: Vec<u32>,
-    /// Edges that bound the sum, from the first vertex to the second, so many times over.
-    boundary: Vec<([u32; 2], u32)>,
-}
-
-/// Chooses, patch by patch of duplicated triangles, whether duplicates count as often as they occur
-/// (two solids that share a face) or once (a face written twice): whatever leaves the shorter boundary.
-fn layers(mesh: &TriangleMesh, topology: &Topology) -> Layers {
-    let count = topology.triangles.len();
-    // Weight of a triangle in the sum when all duplicates count, and when they count once; opposite ones cancel.
-    let mut once: Vec<i8> = topology.triangles.iter().map(|t| i8::from(!collapsed(t))).collect();
-    let mut sets = Sets::new(count);
-    let mut copied = vec![false; count];
-    for group in topology.copies() {
-        let mut seen = None;
-        for &t in group.even.iter().chain(&group.odd) {
-            once[t as usize] = 0;
-            copied[t as usize] = true;
-            sets.join(*seen.get_or_insert(t), t);
-        }
-        match (group.even.first(), group.odd.first()) {
-            (Some(&t), None) | (None, Some(&t)) => once[t as usize] = 1,
-            _ => {}
-        }
-    }
-    for edge in topology.edges() {
-        let mut seen = None;
-        for side in edge.iter().filter(|s| copied[s.triangle as usize]) {
-            sets.join(*seen.get_or_insert(side.triangle), side.triangle);
-        }
-    }
-    // Boundary length that counting once saves, by patch.
-    let mut saved = vec![0.0; count];
-    for edge in topology.edges() {
-        if let Some(side) = edge.iter().find(|s| copied[s.triangle as usize]) {
-            let [a, b] = edge[0].ends.map(|v| mesh.vertices()[v as usize]);
-            let open = |weight: &dyn Fn(u32) -> i64| {
-                edge.iter().map(|s| if s.forward { weight(s.triangle) } else { -weight(s.triangle) }).sum::<i64>().abs()
-            };
-            let difference = open(&|_| 1) - open(&|t| i64::from(once[t as usize]));
-            saved[sets.find(side.triangle) as usize] += difference as f64 * (b - a).length();
-        }
-    }
-    let weight: Vec<i64> = (0..count)
-        .map(|t| {
-            let counts = copied[t] && !(saved[sets.find(t as u32) as usize] > 0.0);
-            if counts { 1 } else { i64::from(once[t]) }
-        })
-        .collect();
-    let mut boundary = Vec::new();
-    for edge in topology.edges() {
-        let times: i64 = edge.iter().map(|s| if s.forward { weight[s.triangle as usize] } else { -weight[s.triangle as usize] }).sum();
-        let [a, b] = edge[0].ends;
-        if times != 0 {
-            boundary.push((if times > 0 { [a, b] } else { [b, a] }, times.unsigned_abs() as u32));
-        }
-    }
-    Layers { triangles: (0..count as u32).filter(|&t| weight[t as usize] != 0).collect(), boundary }
 }

@@ -1,0 +1,166 @@
+//! Angle-weighted pseudonormals (Baerentzen and Aanaes 2005), with proof against rounding.
+//!
+//! At a point q of a closed, consistently oriented surface that does not meet itself, let N be the sum
+//! of the unit normals of the triangles that meet there, each times its angle at q (2 pi inside a face, pi on an
+//! edge). By the divergence theorem on a small ball around q, N . e = -2 * integral of cos over the directions
+//! that lead inside, for any unit vector e and the angle to it. If q is the nearest point to p and e the direction
+//! from q to p, all directions with a positive cosine lead to p's side, so N . e > 0 just if p is outside.
+//!
+//! In floating point q is only almost nearest: the ball around p is empty up to r - d, for r = |p - q| and d
+//! the rounding. If the surface within s of q is nothing but the triangles that meet at q, the directions with
+//! cosines above g = d / s + s / (2 r) still lead to p's side, and the others add at most
+//! 2 pi g^2. So |N . e| > 2 pi g^2 proves the side; anything else is left to the winding number.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::bvh::intersect::{Clearance, Meetings};
+use crate::geom::{DVec3, FacetPoint, Feature};
+use crate::mesh::TriangleMesh;
+use crate::mesh::topology::{Topology, collapsed};
+
+/// Half an ulp of 1.
+const UNIT: f64 = f64::EPSILON / 2.0;
+
+/// A sum of unit normals weighted by angles, and the rounding in it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pseudonormal {
+    sum: DVec3,
+    error: f64,
+}
+
+impl Pseudonormal {
+    fn add(&mut self, normal: Self, angle: f64) {
+        self.sum += normal.sum * angle;
+        self.error += normal.error * angle + 16.0 * UNIT;
+    }
+}
+
+/// The pseudonormals of a mesh on its welded topology.
+#[derive(Clone, Debug)]
+pub(crate) struct Pseudonormals {
+    /// By triangle: its edges 0, 1, 2 in `edges`.
+    edge_of: Vec<[u32; 3]>,
+    /// By triangle: its corners in `corners`.
+    corner_of: Vec<[u32; 3]>,
+    edges: Vec<Pseudonormal>,
+    corners: Vec<Pseudonormal>,
+    /// Proven room by triangle; empty when the rule is not proven for the mesh.
+    room: Vec<[f32; 2]>,
+    /// How far a nearest point may be off.
+    rounding: f64,
+}
+
+impl Pseudonormals {
+    /// For any mesh; `meetings` of a mesh for which the rule is proven.
+    pub fn new(mesh: &TriangleMesh, topology: &Topology, meetings: Option<&Meetings>) -> Self {
+        let count = topology.triangles.len();
+        let mut corners = vec![Pseudonormal::default(); mesh.vertices().len()];
+        for (t, welded) in topology.triangles.iter().enumerate() {
+            let at = mesh.corners(t as u32);
+            let normal = face(&at);
+            for k in 0..3 {
+                let (u, v) = (at[(k + 1) % 3] - at[k], at[(k + 2) % 3] - at[k]);
+                corners[welded[k] as usize].add(normal, u.cross(v).length().atan2(u.dot(v)));
+            }
+        }
+        let mut edge_of = vec![[u32::MAX; 3]; count];
+        let mut edges = Vec::new();
+        let mut ends = Vec::new();
+        for sides in topology.edges() {
+            let mut sum = Pseudonormal::default();
+            for side in sides {
+                edge_of[side.triangle as usize][usize::from(side.side)] = edges.len() as u32;
+                sum.add(face(&mesh.corners(side.triangle)), PI);
+            }
+            edges.push(sum);
+            ends.push(sides[0].ends);
+        }
+        // A collapsed triangle is a segment: its sides are edges of others, if they are of any.
+        for (t, welded) in topology.triangles.iter().enumerate().filter(|(_, welded)| collapsed(welded)) {
+            for k in 0..3 {
+                let (a, b) = (welded[k], welded[(k + 1) % 3]);
+                if let Ok(edge) = ends.binary_search(&[a.min(b), a.max(b)]) {
+                    edge_of[t][k] = edge as u32;
+                }
+            }
+        }
+        let room = meetings.map_or_else(Vec::new, |m| {
+            (0..count as u32)
+                .map(|t| {
+                    let Clearance { gap, slope } = m.clearance(t);
+                    [gap as f32, slope as f32]
+                })
+                .collect()
+        });
+        Self { edge_of, corner_of: topology.triangles.clone(), edges, corners, room, rounding: rounding(mesh) }
+    }
+
+    /// The side of `p`, whose nearest point is `nearest` on `triangle`: positive outside, negative inside;
+    /// `None` where rounding may have turned it.
+    pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<f64> {
+        let away = p - nearest.point;
+        let distance = away.length();
+        let off = self.rounding.max(64.0 * UNIT * p.abs().max_element());
+        if !(distance > 8.0 * off) {
+            return None;
+        }
+        let t = triangle as usize;
+        let normal = match nearest.feature {
+            Feature::Face => {
+                let mut normal = Pseudonormal::default();
+                normal.add(face(&mesh.corners(triangle)), TAU);
+                normal
+            }
+            Feature::Edge(k) => *self.edges.get(self.edge_of[t][usize::from(k)] as usize)?,
+            Feature::Vertex(k) => self.corners[self.corner_of[t][usize::from(k)] as usize],
+        };
+        let unsure = match self.room.get(t) {
+            None => 0.0,
+            Some(&[gap, slope]) => {
+                let clear = f64::from(gap).min(f64::from(slope) * (reach(&mesh.corners(triangle), nearest) - off)) * 0.5;
+                if !(clear > 4.0 * off) {
+                    return None;
+                }
+                let ball = clear.min((2.0 * distance * off).sqrt()).min(distance);
+                let cosine = off / ball + ball / (2.0 * distance);
+                TAU * cosine * cosine
+            }
+        };
+        let height = normal.sum.dot(away);
+        (height.abs() > (unsure + normal.error) * distance + normal.sum.length() * off).then_some(height)
+    }
+}
+
+/// The unit normal of a triangle; zero where it has none.
+fn face(corners: &[DVec3; 3]) -> Pseudonormal {
+    let [a, b, c] = *corners;
+    let (ab, ac) = (b - a, c - a);
+    let cross = ab.cross(ac);
+    let length = cross.length();
+    if !(length > 0.0) {
+        return Pseudonormal::default();
+    }
+    Pseudonormal { sum: cross / length, error: 8.0 * UNIT * (ab.length() * ac.length() / length + 1.0) }
+}
+
+/// Distance from the nearest point to the edges of its triangle that do not contain its feature.
+fn reach(corners: &[DVec3; 3], nearest: &FacetPoint) -> f64 {
+    let counts = |edge: u8| match nearest.feature {
+        Feature::Face => true,
+        Feature::Edge(own) => edge != own,
+        Feature::Vertex(own) => edge == (own + 1) % 3,
+    };
+    (0..3)
+        .filter(|&edge| counts(edge))
+        .map(|edge| {
+            let (from, to) = (corners[usize::from(edge)], corners[usize::from(edge + 1) % 3]);
+            (to - from).cross(nearest.point - from).length() / (to - from).length()
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+/// How far a nearest point may be off, for points within the box of the mesh.
+pub(crate) fn rounding(mesh: &TriangleMesh) -> f64 {
+    let extent = mesh.extent();
+    64.0 * UNIT * extent.min.abs().max(extent.max.abs()).max_element()
+}
