@@ -14,6 +14,7 @@ pub mod grid;
 #[cfg(feature = "laws")]
 pub mod laws;
 pub mod mesh;
+pub mod product;
 pub mod run;
 mod simd;
 pub mod source;

@@ -1,0 +1,3 @@
+//! What people want from a field or a mesh.
+
+pub mod render;

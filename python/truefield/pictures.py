@@ -1,0 +1,532 @@
+"""Pictures of parts, contours and thickness, rendered without a display. Each is returned and, given a path, written.
+
+All functions take `size` in pixels (width, height), `threads` (None: all) and a `view`: "isometric", "front", "back",
+"left", "right", "top", "bottom", a direction to look along, or a pair of direction and up vector.
+The same input gives the same pixels for any number of threads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image, ImageDraw
+
+from truefield._truefield import Camera, Scene
+from truefield.cloud import PointCloud
+from truefield.colours import Colour, colours_of, distinct, even_map
+from truefield.errors import TruefieldError
+from truefield.files import PathLike, replacing
+from truefield.lettering import (
+    FAINT,
+    INK,
+    LIMIT,
+    RULE,
+    Box,
+    colour_bar,
+    number,
+    tick_labels,
+    ticks,
+    wedge,
+    width_of,
+    write,
+)
+from truefield.mesh import TriangleMesh
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+View = str | Vector | tuple[Vector, Vector]
+Ball = tuple[ArrayLike, float]
+
+WHITE: Final[Colour] = (255, 255, 255)
+_GLASS: Final[Colour] = (138, 172, 205)
+_METAL: Final[Colour] = (196, 204, 212)
+_WARM: Final[Colour] = (233, 106, 38)
+_LINES: Final[Colour] = (24, 36, 50)
+_CLEARNESS: Final = 0.13
+_OCCLUSION: Final = 0.7
+_LEAST, _MOST = 64, 16384
+
+
+def contour_picture(
+    mesh: TriangleMesh,
+    cloud: PointCloud,
+    path: PathLike | None = None,
+    *,
+    view: View = "isometric",
+    size: tuple[int, int] = (1600, 1200),
+    radius: float | None = None,
+    colour: Colour = _WARM,
+    background: Colour | None = WHITE,
+    threads: int | None = None,
+) -> Image.Image:
+    """The part as glass and a contour inside it as shaded discs, one per point.
+
+    Args:
+        mesh: the part.
+        cloud: the contour, with normals.
+        path: PNG to write, or None.
+        view: from where; see the module.
+        size: width and height in pixels.
+        radius: of the discs in model units; None takes it from the distances of neighbouring points.
+        colour: of the contour.
+        background: a colour, or None for a transparent picture.
+        threads: worker threads.
+
+    Raises:
+        TruefieldError: an input cannot be drawn; the sentence says why.
+    """
+    _check_size(size)
+    scene = Scene()
+    _add_part(scene, mesh, size, opacity=_CLEARNESS)
+    _add_points(scene, cloud, radius, colour)
+    image = _render(scene, _camera(mesh, view), size, background, threads)
+    return _finished(image, path)
+
+
+def part_picture(
+    mesh: TriangleMesh,
+    path: PathLike | None = None,
+    *,
+    view: View = "isometric",
+    size: tuple[int, int] = (1600, 1200),
+    colour: Colour = _METAL,
+    background: Colour | None = WHITE,
+    threads: int | None = None,
+) -> Image.Image:
+    """The part, opaque, with its sharp edges drawn.
+
+    Raises:
+        TruefieldError: an input cannot be drawn; the sentence says why.
+    """
+    _check_size(size)
+    scene = Scene()
+    _add_part(scene, mesh, size, colour=colour)
+    return _finished(_render(scene, _camera(mesh, view), size, background, threads), path)
+
+
+def thickness_picture(
+    mesh: TriangleMesh,
+    values: ArrayLike,
+    path: PathLike | None = None,
+    *,
+    above: float | None = None,
+    below: float | None = None,
+    ball: Ball | None = None,
+    span: tuple[float, float] | None = None,
+    title: str = "Wall thickness",
+    view: View = "isometric",
+    size: tuple[int, int] = (1600, 1200),
+    threads: int | None = None,
+) -> Image.Image:
+    """The part coloured by thickness, a colour bar with the limits, and the part as glass with its thickest place.
+
+    Args:
+        mesh: the part.
+        values: thickness per vertex (n,), per triangle (m,) or per corner (m, 3), in model units; NaN is drawn grey.
+        path: PNG to write, or None.
+        above: limit marked on the bar.
+        below: limit marked on the bar.
+        ball: centre (3,) and radius of the largest inscribed ball; None leaves the second panel out.
+        span: values at the ends of the bar; None takes those of the data.
+        title: over the picture.
+        view: from where; see the module.
+        size: width and height in pixels.
+        threads: worker threads.
+
+    Raises:
+        TruefieldError: an input cannot be drawn; the sentence says why.
+    """
+    _check_size(size)
+    data, per = _values(mesh, values)
+    span = _span(data, span)
+    camera = _camera(mesh, view, margin=0.03)
+    unit = min(size[0] / 1600, size[1] / 1200)
+    text = 26.0 * unit
+    page = Image.new("RGB", size, WHITE)
+    draw = ImageDraw.Draw(page)
+    edge = round(48 * unit)
+    write(draw, (edge, edge), title, 1.5 * text, anchor="la")
+    write(draw, (edge, edge + 2.0 * text), "model units", text, colour=FAINT, anchor="la")
+
+    limits = [(name, value) for name, value in (("above", above), ("below", below)) if value is not None]
+    names = max([width_of(f"{name} {number(value)}", text) for name, value in limits], default=0.0)
+    labels = max(width_of(label, text) for label in tick_labels(ticks(*span)))
+    bar = round(34 * unit)
+    column = round(names + labels + bar + 3.4 * text) + edge
+    top = edge + round(3.6 * text)
+    panels = _panels((edge, top, size[0] - column, size[1] - edge), 1 if ball is None else 2, _aspect(camera))
+    right = size[0] - edge - round(labels + 0.7 * text)
+    colour_bar(page, (right - bar, top, right, min(size[1] - edge, top + round(760 * unit))), span, text, limits)
+
+    scene = Scene()
+    box = panels[0]
+    scene.add_mesh(
+        mesh.vertices,
+        mesh.triangles,
+        np.ascontiguousarray(even_map()),
+        per=per,
+        values=data.ravel(),
+        span=span,
+        finish="chart",
+        ink=(_LINES, 0.6, _pen(size)),
+    )
+    _place(page, scene, camera, box, threads)
+    if ball is not None:
+        center, radius = _ball(ball)
+        box = panels[1]
+        caption = round(1.8 * text)
+        glass = Scene()
+        _add_part(glass, mesh, size, opacity=_CLEARNESS)
+        colour = np.ascontiguousarray(colours_of([2.0 * radius], *span))
+        glass.add_balls(center[None, :], np.array([radius]), colour)
+        _place(page, glass, camera, (box[0], box[1], box[2], box[3] - caption), threads)
+        words = f"Thickest place: a ball of diameter {number(2.0 * radius)} fits in"
+        write(draw, (0.5 * (box[0] + box[2]), box[3] - 0.4 * text), words, text, anchor="ms")
+    return _finished(page, path)
+
+
+def heavy_sections_picture(
+    mesh: TriangleMesh,
+    balls: Sequence[Ball],
+    path: PathLike | None = None,
+    *,
+    contour: PointCloud | None = None,
+    above: float | None = None,
+    view: View = "isometric",
+    size: tuple[int, int] = (1600, 1200),
+    threads: int | None = None,
+) -> Image.Image:
+    """The part as glass with the deepest ball of each heavy section, numbered and listed.
+
+    Args:
+        mesh: the part.
+        balls: centre (3,) and radius of each section's deepest ball, in the order of their numbers, 1 first.
+        path: PNG to write, or None.
+        contour: drawn inside, for instance where depth equals half the limit.
+        above: the limit on wall thickness, for the title.
+        view: from where; see the module.
+        size: width and height in pixels.
+        threads: worker threads.
+
+    Raises:
+        TruefieldError: an input cannot be drawn; the sentence says why.
+    """
+    _check_size(size)
+    pairs = [_ball(ball) for ball in balls]
+    unit = min(size[0] / 1600, size[1] / 1200)
+    text = 26.0 * unit
+    edge = round(48 * unit)
+    page = Image.new("RGB", size, WHITE)
+    draw = ImageDraw.Draw(page)
+    count = len(pairs)
+    title = "No heavy section" if count == 0 else "1 heavy section" if count == 1 else f"{count} heavy sections"
+    write(draw, (edge, edge), title, 1.5 * text)
+    limit = "" if above is None else f"walls thicker than {number(above)}, "
+    write(draw, (edge, edge + 2.0 * text), f"{limit}model units", text, colour=FAINT)
+    camera = _camera(mesh, view, margin=0.03)
+    scene = Scene()
+    _add_part(scene, mesh, size, opacity=_CLEARNESS)
+    if contour is not None:
+        _add_points(scene, contour, None, _WARM)
+    palette = distinct(count)
+    for (center, radius), colour in zip(pairs, palette, strict=True):
+        scene.add_balls(center[None, :], np.array([radius]), np.array([colour], dtype=np.uint8))
+    top = edge + round(3.6 * text)
+    shown = min(count, max(1, int((size[1] - top - edge) / (1.5 * text)) - 1))
+    rows = [f"ball of diameter {number(2.0 * radius)}" for _, radius in pairs[:shown]]
+    column = round(max([width_of(row, text) for row in rows], default=0.0) + 2.4 * text) + edge if rows else edge
+    box = (edge, top, size[0] - column - edge // 2, size[1] - edge)
+    _place(page, scene, camera, box, threads)
+    left = size[0] - column
+    for index, row in enumerate(rows):
+        y = top + 1.5 * text * (index + 0.5)
+        _badge(page, (left + 0.6 * text, y), str(index + 1), text, palette[index])
+        write(draw, (left + 1.8 * text, y), row, text, anchor="lm")
+    if shown < count:
+        y = top + 1.5 * text * (shown + 0.5)
+        write(draw, (left + 1.8 * text, y), f"and {count - shown} more", text, colour=FAINT, anchor="lm")
+    if pairs:
+        wide, high = box[2] - box[0], box[3] - box[1]
+        pixels = camera.project(np.array([center for center, _ in pairs]), wide, high)
+        for index, (x, y, _) in enumerate(pixels[:shown].tolist()):
+            _badge(page, (box[0] + x, box[1] + y), str(index + 1), text, palette[index])
+    return _finished(page, path)
+
+
+def histogram_picture(
+    values: ArrayLike,
+    weights: ArrayLike | None = None,
+    path: PathLike | None = None,
+    *,
+    above: float | None = None,
+    below: float | None = None,
+    percentiles: Sequence[float] = (5.0, 50.0, 95.0),
+    span: tuple[float, float] | None = None,
+    title: str = "Wall thickness",
+    share: str = "share of area",
+    bins: int = 64,
+    size: tuple[int, int] = (1600, 1000),
+) -> Image.Image:
+    """A weighted histogram in the colours of the colour bar, with percentiles and limits.
+
+    Args:
+        values: (n,) in model units; NaN are left out.
+        weights: (n,) areas; None counts all alike.
+        path: PNG to write, or None.
+        above: limit drawn as a line.
+        below: limit drawn as a line.
+        percentiles: marked under the axis; area-weighted.
+        span: ends of the axis and of the colour map; None takes those of the data.
+        title: over the picture.
+        share: what the upright axis counts.
+        bins: number of bars.
+        size: width and height in pixels.
+
+    Raises:
+        TruefieldError: an input cannot be drawn; the sentence says why.
+    """
+    _check_size(size)
+    data, weight = _weighted(values, weights)
+    if not 1 <= bins <= 4096:
+        raise TruefieldError(f"a histogram needs 1 to 4096 bars, not {bins}")
+    span = _span(data, span)
+    heights, edges = np.histogram(np.clip(data, *span), bins=bins, range=span, weights=weight / weight.sum())
+    heights = 100.0 * heights
+    unit = min(size[0] / 1600, size[1] / 1000)
+    text = 26.0 * unit
+    edge = round(48 * unit)
+    page = Image.new("RGB", size, WHITE)
+    draw = ImageDraw.Draw(page)
+    write(draw, (edge, edge), title, 1.5 * text)
+
+    most = float(heights.max()) * 1.08
+    uprights = ticks(0.0, most, most=6)
+    labels = [f"{label} %" for label in tick_labels(uprights)]
+    left = edge + round(max(width_of(label, text) for label in labels) + 0.8 * text)
+    right, top = size[0] - edge, edge + round(5.2 * text)
+    bottom = size[1] - edge - round(5.0 * text)
+
+    def x_of(value: float) -> float:
+        return left + (value - span[0]) / (span[1] - span[0]) * (right - left)
+
+    def y_of(height: float) -> float:
+        return bottom - height / most * (bottom - top)
+
+    write(draw, (edge, edge + 2.0 * text), f"{share} per bar", text, colour=FAINT)
+    thin = max(1, round(1.5 * unit))
+    for place, label in zip(uprights, labels, strict=True):
+        y = round(y_of(place))
+        draw.line((left, y, right, y), fill=RULE, width=thin)
+        write(draw, (left - 0.5 * text, y), label, text, anchor="rm")
+    bar_colours = colours_of(0.5 * (edges[1:] + edges[:-1]), *span)
+    for index, height in enumerate(heights.tolist()):
+        x0, x1 = round(x_of(float(edges[index]))), round(x_of(float(edges[index + 1])))
+        y = round(y_of(height))
+        if height > 0.0:
+            gap = 1 if x1 - x0 > 5 else 0
+            red, green, blue = bar_colours[index].tolist()
+            draw.rectangle((x0, min(y, bottom - 1), x1 - 1 - gap, bottom - 1), fill=(red, green, blue))
+    draw.line((left, bottom, right, bottom), fill=INK, width=max(1, round(2 * unit)))
+    places = ticks(*span, most=max(2, min(11, int((right - left) / (4.5 * text)))))
+    for place, label in zip(places, tick_labels(places), strict=True):
+        x = round(x_of(place))
+        draw.line((x, bottom, x, bottom + 0.35 * text), fill=INK, width=thin)
+        write(draw, (x, bottom + 0.6 * text), label, text, anchor="ma")
+    write(draw, (right, bottom + 3.6 * text), "model units", text, colour=FAINT, anchor="ra")
+    _percentiles(page, data, weight, percentiles, x_of=x_of, y=bottom + 2.1 * text, text=text)
+    for name, value, row in (("below", below, 0.6), ("above", above, 1.8)):
+        if value is not None and span[0] <= value <= span[1]:
+            beyond = float(weight[data < value].sum() if name == "below" else weight[data > value].sum())
+            words = f"{number(100.0 * beyond / float(weight.sum()))} % {name} {number(value)}"
+            x, base = round(x_of(value)), top - row * text
+            draw.line((x, base - 0.8 * text, x, bottom), fill=LIMIT, width=max(1, round(2.5 * unit)))
+            # On the side that it speaks of, where there is room.
+            room = right - x if name == "above" else x - left
+            rightward = (name == "above") == (room > width_of(words, text) + text)
+            write(
+                draw,
+                (x + (0.4 if rightward else -0.4) * text, base),
+                words,
+                text,
+                colour=LIMIT,
+                anchor="ls" if rightward else "rs",
+            )
+    return _finished(page, path)
+
+
+def _percentiles(
+    page: Image.Image,
+    data: Array,
+    weight: Array,
+    percentiles: Sequence[float],
+    *,
+    x_of: Callable[[float], float],
+    y: float,
+    text: float,
+) -> None:
+    order = np.argsort(data, kind="stable")
+    below = np.cumsum(weight[order])
+    end = 0.0
+    for percentile in sorted(percentiles):
+        place = int(np.searchsorted(below, percentile / 100.0 * below[-1]))
+        value = float(data[order[min(place, len(order) - 1)]])
+        words = f"median {number(value)}" if percentile == 50.0 else f"{number(percentile)} %: {number(value)}"
+        half = 0.5 * width_of(words, text)
+        # Labels that would touch the one before move right.
+        middle = min(max(x_of(value), half + 0.5 * text, end + half), page.width - half - 0.5 * text)
+        end = middle + half + 0.8 * text
+        wedge(page, (x_of(value), y), 0.6 * text, -90.0, INK)
+        write(ImageDraw.Draw(page), (middle, y + 0.9 * text), words, text, anchor="ma")
+
+
+def _check_size(size: tuple[int, int]) -> None:
+    if len(size) != 2 or not all(isinstance(side, int) and _LEAST <= side <= _MOST for side in size):
+        raise TruefieldError(
+            f"a picture of size {size} cannot be drawn; give (width, height), both {_LEAST} to {_MOST}"
+        )
+
+
+def _camera(mesh: TriangleMesh, view: View, margin: float = 0.06) -> Camera:
+    points = np.ascontiguousarray(mesh.vertices[np.unique(mesh.triangles)])
+    if isinstance(view, str):
+        return Camera(points, view, margin=margin)
+    try:
+        given = np.asarray(view, dtype=np.float64)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    if given.shape not in ((3,), (2, 3)) or not np.isfinite(given).all():
+        raise TruefieldError(
+            f"the view {view!r} is neither a name nor a direction nor a pair of direction and up vector"
+        )
+    direction, up = (given, np.array([0.0, 0.0, 1.0])) if given.ndim == 1 else given
+    if given.ndim == 1 and np.linalg.norm(np.cross(direction, up)) < 1e-3 * np.linalg.norm(direction):
+        up = np.array([0.0, 1.0, 0.0])
+    return Camera(points, direction=tuple(direction.tolist()), up=tuple(up.tolist()), margin=margin)
+
+
+def _pen(size: tuple[int, int]) -> float:
+    """Width of lines in pixels: the same share of any picture."""
+    return max(1.0, 1.5 * min(size[0] / 1600, size[1] / 1200))
+
+
+def _add_part(
+    scene: Scene, mesh: TriangleMesh, size: tuple[int, int], *, opacity: float = 1.0, colour: Colour | None = None
+) -> None:
+    solid = opacity >= 1.0
+    scene.add_mesh(
+        mesh.vertices,
+        mesh.triangles,
+        np.array([colour or (_METAL if solid else _GLASS)], dtype=np.uint8),
+        finish="satin" if solid else "polished",
+        opacity=opacity,
+        ink=(_LINES, 0.7 if solid else 0.5, _pen(size)),
+    )
+
+
+def _add_points(scene: Scene, cloud: PointCloud, radius: float | None, colour: Colour) -> None:
+    if len(cloud) == 0:
+        return
+    # Without normals the discs face the viewer.
+    normals = np.zeros_like(cloud.points) if cloud.normals is None else cloud.normals
+    scene.add_points(cloud.points, normals, np.array([colour], dtype=np.uint8), radius=radius)
+
+
+def _render(
+    scene: Scene, camera: Camera, size: tuple[int, int], background: Colour | None, threads: int | None
+) -> Image.Image:
+    pixels, _ = scene.render(camera, size[0], size[1], background=background, occlusion=_OCCLUSION, threads=threads)
+    image = Image.fromarray(pixels)
+    return image if background is None else image.convert("RGB")
+
+
+def _place(page: Image.Image, scene: Scene, camera: Camera, box: Box, threads: int | None) -> None:
+    size = (max(box[2] - box[0], 1), max(box[3] - box[1], 1))
+    page.paste(_render(scene, camera, size, WHITE, threads), (box[0], box[1]))
+
+
+def _aspect(camera: Camera) -> float:
+    """Width over height of what the camera holds."""
+    wide, high = camera.span
+    return wide / high
+
+
+def _panels(box: Box, count: int, aspect: float) -> list[Box]:
+    """One or two boxes, side by side or one above the other: whichever shows the part larger."""
+    left, top, right, bottom = box
+    if count == 1:
+        return [box]
+    wide, high = right - left, bottom - top
+    beside = min(0.5 * wide / aspect, high)
+    stacked = min(wide / aspect, 0.5 * high)
+    if beside >= stacked:
+        middle = (left + right) // 2
+        return [(left, top, middle, bottom), (middle, top, right, bottom)]
+    middle = (top + bottom) // 2
+    return [(left, top, right, middle), (left, middle, right, bottom)]
+
+
+def _badge(page: Image.Image, at: tuple[float, float], label: str, text: float, colour: Colour) -> None:
+    """A number in a small white disc with a coloured rim."""
+    scale, radius = 4, 0.72 * text
+    half = math.ceil(radius) + 2
+    disc = Image.new("RGBA", (2 * half * scale, 2 * half * scale), (255, 255, 255, 0))
+    reach = [(half - radius) * scale, (half - radius) * scale, (half + radius) * scale, (half + radius) * scale]
+    ImageDraw.Draw(disc).ellipse(reach, fill=(255, 255, 255, 235), outline=colour, width=round(0.11 * text * scale))
+    disc = disc.resize((2 * half, 2 * half), Image.Resampling.BOX)
+    page.paste(disc, (round(at[0]) - half, round(at[1]) - half), disc)
+    write(ImageDraw.Draw(page), (round(at[0]), round(at[1])), label, 0.9 * text, anchor="mm")
+
+
+def _ball(ball: Ball) -> tuple[Array, float]:
+    center, radius = np.asarray(ball[0], dtype=np.float64), float(ball[1])
+    if center.shape != (3,) or not np.isfinite(center).all() or not (radius > 0.0 and math.isfinite(radius)):
+        raise TruefieldError(f"the ball {ball!r} is no centre (x, y, z) with a positive radius")
+    return center, radius
+
+
+def _values(mesh: TriangleMesh, values: ArrayLike) -> tuple[Array, str]:
+    data = np.ascontiguousarray(values, dtype=np.float64)
+    vertices, triangles = len(mesh.vertices), len(mesh.triangles)
+    for shape, per in (((vertices,), "vertex"), ((triangles,), "element"), ((triangles, 3), "corner")):
+        if data.shape == shape:
+            return data, per
+    raise TruefieldError(
+        f"the values have shape {data.shape}; give one per vertex ({vertices},), per triangle ({triangles},) "
+        f"or per corner ({triangles}, 3)"
+    )
+
+
+def _span(data: Array, span: tuple[float, float] | None) -> tuple[float, float]:
+    known = data[np.isfinite(data)]
+    if span is None and known.size == 0:
+        raise TruefieldError("none of the values is a finite number; there is nothing to draw")
+    low, high = (float(known.min()), float(known.max())) if span is None else (float(span[0]), float(span[1]))
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise TruefieldError(f"the span {low} to {high} is no range; give finite ends, the lower one first")
+    # A plate has one thickness; its bar still needs a height.
+    room = max(0.05 * abs(high), 1e-12) if high - low <= 1e-9 * max(abs(low), abs(high)) else 0.0
+    return low - room, high + room
+
+
+def _weighted(values: ArrayLike, weights: ArrayLike | None) -> tuple[Array, Array]:
+    data = np.asarray(values, dtype=np.float64).ravel()
+    weight = np.ones_like(data) if weights is None else np.asarray(weights, dtype=np.float64).ravel()
+    if data.shape != weight.shape:
+        raise TruefieldError(f"{len(data)} values need as many weights, not {len(weight)}")
+    if not (np.isfinite(weight).all() and (weight >= 0.0).all()):
+        raise TruefieldError("a weight is negative or not finite; weights are areas")
+    known = np.isfinite(data)
+    if not weight[known].sum() > 0.0:
+        raise TruefieldError("no value has a weight above zero; there is nothing to draw")
+    return data[known], weight[known]
+
+
+def _finished(image: Image.Image, path: PathLike | None) -> Image.Image:
+    if path is not None:
+        with replacing(path) as stream:
+            image.save(stream, format="PNG", optimize=False)
+    return image
