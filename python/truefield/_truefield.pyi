@@ -10,7 +10,7 @@ _Floats = NDArray[np.float64]
 _Progress = Callable[[str, float], None] | None
 _NearestArrays = tuple[_Floats, _Floats, NDArray[np.int64], NDArray[np.uint8], _Floats]
 
-__all__ = ["CompleteField", "SampledField", "Surface", "__version__"]
+__all__ = ["Camera", "CompleteField", "SampledField", "Scene", "Surface", "__version__"]
 
 __version__: str
 
@@ -81,3 +81,73 @@ class SampledField:
     def upper(self) -> NDArray[np.float32]: ...
     def distance(self, points: _Floats) -> _Floats: ...
     def bounds(self, points: _Floats) -> tuple[_Floats, _Floats]: ...
+
+@final
+class Camera:
+    def __new__(
+        cls,
+        points: _Floats,
+        view: str | None = None,
+        direction: tuple[float, float, float] | None = None,
+        up: tuple[float, float, float] | None = None,
+        field_of_view: float | None = None,
+        margin: float = 0.06,
+    ) -> Camera: ...
+    @property
+    def forward(self) -> tuple[float, float, float]: ...
+    @property
+    def eye(self) -> tuple[float, float, float]: ...
+    @property
+    def span(self) -> tuple[float, float]: ...
+    def project(self, points: _Floats, width: int, height: int) -> _Floats: ...
+
+@final
+class Scene:
+    def __new__(cls) -> Scene: ...
+    def add_mesh(
+        self,
+        vertices: _Floats,
+        triangles: NDArray[np.int64],
+        colours: NDArray[np.uint8],
+        per: str = "whole",
+        values: _Floats | None = None,
+        span: tuple[float, float] | None = None,
+        finish: str = "satin",
+        opacity: float = 1.0,
+        ink: tuple[tuple[int, int, int], float, float] | None = None,
+    ) -> None: ...
+    def add_points(
+        self,
+        points: _Floats,
+        normals: _Floats,
+        colours: NDArray[np.uint8],
+        per: str = "whole",
+        values: _Floats | None = None,
+        span: tuple[float, float] | None = None,
+        finish: str = "satin",
+        radius: float | None = None,
+    ) -> None: ...
+    def add_balls(
+        self,
+        centers: _Floats,
+        radii: _Floats,
+        colours: NDArray[np.uint8],
+        per: str = "whole",
+        values: _Floats | None = None,
+        span: tuple[float, float] | None = None,
+        finish: str = "polished",
+        opacity: float = 1.0,
+    ) -> None: ...
+    @property
+    def extent(self) -> tuple[_Floats, _Floats] | None: ...
+    def render(
+        self,
+        camera: Camera,
+        width: int,
+        height: int,
+        samples: int = 9,
+        background: tuple[int, int, int] | None = None,
+        occlusion: float = 0.0,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...

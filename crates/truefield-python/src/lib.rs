@@ -3,6 +3,7 @@
 mod convert;
 mod door;
 mod field;
+mod render;
 mod surface;
 
 use pyo3::prelude::*;
@@ -13,5 +14,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<surface::PySurface>()?;
     module.add_class::<field::PyCompleteField>()?;
     module.add_class::<field::PySampledField>()?;
+    module.add_class::<render::PyCamera>()?;
+    module.add_class::<render::PyScene>()?;
     Ok(())
 }

@@ -1,26 +1,14 @@
 //! `Scene` and `Camera`: pictures as arrays.
 
-use std::sync::Arc;
-
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use truefield::product::render::{
-    Background, Canvas, Finish, Ink, Paint, Picture, Projection, Ramp, Rgb, Samples, Scene as CoreScene, View, covering_radius, render,
+    Background, Camera, Canvas, Finish, Ink, Paint, Picture, Projection, Ramp, Rgb, Samples, Scene, View, covering_radius, render,
 };
-use truefield::{Aabb, DVec3, Error, Result, Run, TriangleMesh, product::render::Camera as CoreCamera};
+use truefield::{Aabb, Error, Result};
 
-fn raise(error: &Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
-}
-
-fn vectors(what: &str, array: &PyReadonlyArray2<'_, f64>) -> Result<Vec<DVec3>> {
-    let view = array.as_array();
-    if view.ncols() != 3 {
-        return Err(Error::invalid(format!("{what} has shape {:?}; give an array of shape (n, 3)", view.shape())));
-    }
-    Ok(view.rows().into_iter().map(|row| DVec3::new(row[0], row[1], row[2])).collect())
-}
+use crate::convert::{mesh, points as vectors};
+use crate::door::{job, raise};
 
 fn colours(array: &PyReadonlyArray2<'_, u8>) -> Result<Vec<Rgb>> {
     let view = array.as_array();
@@ -66,11 +54,11 @@ fn finish(name: &str) -> Result<Finish> {
 }
 
 /// Where the viewer stands.
-#[pyclass(frozen, module = "truefield._truefield")]
-pub struct Camera(CoreCamera);
+#[pyclass(name = "Camera", module = "truefield._truefield", frozen)]
+pub struct PyCamera(Camera);
 
 #[pymethods]
-impl Camera {
+impl PyCamera {
     #[new]
     #[pyo3(signature = (points, view = None, direction = None, up = None, field_of_view = None, margin = 0.06))]
     fn new(
@@ -81,15 +69,16 @@ impl Camera {
         field_of_view: Option<f64>,
         margin: f64,
     ) -> PyResult<Self> {
+        let points = vectors(&points)?;
         let make = || {
             let view = match direction {
                 Some(direction) => View::Along { direction: direction.into(), up: up.unwrap_or((0.0, 0.0, 1.0)).into() },
                 None => View::named(view.unwrap_or("isometric"))?,
             };
             let projection = field_of_view.map_or(Projection::Orthographic, |field_of_view| Projection::Perspective { field_of_view });
-            CoreCamera::fit(vectors("points", &points)?, view, projection, margin)
+            Camera::fit(points, view, projection, margin)
         };
-        make().map(Self).map_err(|error| raise(&error))
+        make().map(Self).map_err(raise)
     }
 
     /// Unit vector into the scene.
@@ -119,24 +108,24 @@ impl Camera {
         height: u32,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let lens = self.0.lens(width, height);
-        let points = vectors("points", &points).map_err(|error| raise(&error))?;
+        let points = vectors(&points)?;
         let pixels: Vec<f64> = points.iter().flat_map(|p| lens.pixel(*p).unwrap_or([f64::NAN; 3])).collect();
         pixels.into_pyarray(py).reshape([points.len(), 3])
     }
 }
 
 /// Triangles, points and balls to be drawn.
-#[pyclass(module = "truefield._truefield")]
-pub struct Scene(Arc<CoreScene>);
+#[pyclass(name = "Scene", module = "truefield._truefield")]
+pub struct PyScene(Scene);
 
 type Corners<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 type Drawn<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray2<f32>>);
 
 #[pymethods]
-impl Scene {
+impl PyScene {
     #[new]
     fn new() -> Self {
-        Self(Arc::new(CoreScene::new()))
+        Self(Scene::new())
     }
 
     /// Adds a mesh: `colours` are the paint, or the ramp of `values`; `ink` is colour, opacity and width in pixels of its lines.
@@ -154,18 +143,12 @@ impl Scene {
         opacity: f64,
         ink: Option<((u8, u8, u8), f64, f64)>,
     ) -> PyResult<()> {
+        let mesh = mesh(&vertices, &triangles)?;
         let add = || {
-            let view = triangles.as_array();
-            if view.ncols() != 3 {
-                return Err(Error::invalid(format!("triangles has shape {:?}; give an array of shape (m, 3)", view.shape())));
-            }
-            let index = |v: i64| u32::try_from(v).unwrap_or(u32::MAX);
-            let triangles = view.rows().into_iter().map(|row| [index(row[0]), index(row[1]), index(row[2])]).collect();
-            let mesh = TriangleMesh::new(vectors("vertices", &vertices)?, triangles)?;
             let ink = ink.map(|((r, g, b), opacity, width)| Ink { colour: [r, g, b], opacity, width });
-            Arc::make_mut(&mut self.0).add_mesh(&mesh, paint(per, &colours, values, span)?, self::finish(finish)?, opacity, ink)
+            self.0.add_mesh(&mesh, paint(per, &colours, values, span)?, self::finish(finish)?, opacity, ink)
         };
-        add().map_err(|error| raise(&error))
+        add().map_err(raise)
     }
 
     /// Adds points as discs that face along their normals; without a radius it is taken from their distances.
@@ -182,16 +165,16 @@ impl Scene {
         finish: &str,
         radius: Option<f64>,
     ) -> PyResult<()> {
+        let (points, normals) = (vectors(&points)?, vectors(&normals)?);
+        let normals = normals.into_iter().map(|n| [n.x as f32, n.y as f32, n.z as f32]).collect();
         let add = || {
-            let normals = vectors("normals", &normals)?.into_iter().map(|n| [n.x as f32, n.y as f32, n.z as f32]).collect();
-            let points = vectors("points", &points)?;
             let radius = match radius {
                 Some(radius) => radius,
                 None => covering_radius(&points)?,
             };
-            Arc::make_mut(&mut self.0).add_points(points, normals, radius, paint(per, &colours, values, span)?, self::finish(finish)?)
+            self.0.add_points(points, normals, radius, paint(per, &colours, values, span)?, self::finish(finish)?)
         };
-        add().map_err(|error| raise(&error))
+        add().map_err(raise)
     }
 
     /// Adds balls.
@@ -208,16 +191,17 @@ impl Scene {
         finish: &str,
         opacity: f64,
     ) -> PyResult<()> {
+        let centers = vectors(&centers)?;
         let add = || {
-            Arc::make_mut(&mut self.0).add_balls(
-                vectors("centers", &centers)?,
+            self.0.add_balls(
+                centers,
                 radii.as_array().iter().copied().collect(),
                 paint(per, &colours, values, span)?,
                 self::finish(finish)?,
                 opacity,
             )
         };
-        add().map_err(|error| raise(&error))
+        add().map_err(raise)
     }
 
     /// Lower and upper corner of all that is in the scene; None for an empty scene.
@@ -228,40 +212,30 @@ impl Scene {
     }
 
     /// Draws: (height, width, 4) uint8 colours with straight opacity, and (height, width) float32 depths.
-    #[pyo3(signature = (camera, width, height, samples = 9, background = None, occlusion = 0.0, threads = None))]
+    #[pyo3(signature = (camera, width, height, samples = 9, background = None, occlusion = 0.0, threads = None, progress = None))]
     #[allow(clippy::too_many_arguments)]
     fn render<'py>(
         &self,
         py: Python<'py>,
-        camera: &Camera,
+        camera: &PyCamera,
         width: u32,
         height: u32,
         samples: u32,
         background: Option<(u8, u8, u8)>,
         occlusion: f64,
         threads: Option<usize>,
+        progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Drawn<'py>> {
         let samples = match samples {
             1 => Samples::One,
             9 => Samples::Nine,
             25 => Samples::TwentyFive,
-            _ => return Err(PyValueError::new_err(format!("a pixel takes 1, 9 or 25 samples, not {samples}"))),
+            _ => return Err(raise(Error::invalid(format!("a pixel takes 1, 9 or 25 samples, not {samples}")))),
         };
         let background = background.map_or(Background::Transparent, |(r, g, b)| Background::Colour([r, g, b]));
         let canvas = Canvas { width, height, samples, background, occlusion };
-        let (scene, camera) = (Arc::clone(&self.0), camera.0);
-        let picture = py.detach(move || {
-            let run = threads.map_or_else(Run::default, Run::with_threads);
-            render(&scene, &camera, &canvas, &run)
-        });
-        let Picture { rgba, depth, .. } = picture.map_err(|error| raise(&error))?;
+        let Picture { rgba, depth, .. } = job(py, threads, progress, |run| render(&self.0, &camera.0, &canvas, run))?;
         let (width, height) = (width as usize, height as usize);
         Ok((rgba.into_pyarray(py).reshape([height, width, 4])?, depth.into_pyarray(py).reshape([height, width])?))
     }
-}
-
-/// Adds this file's classes to the module.
-pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<Camera>()?;
-    module.add_class::<Scene>()
 }
