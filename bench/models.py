@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import truefield as tf
 
 SUFFIXES = {".stl", ".obj", ".ply", ".off", ".glb", ".gltf", ".3mf"}
@@ -19,4 +20,19 @@ def models(folder: Path | None, only: list[str]) -> Iterator[tf.TriangleMesh]:
         return
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() in SUFFIXES and (not only or any(word in path.name.lower() for word in only)):
-            yield tf.read(path)
+            part = tf.read(path)
+            yield welded(part) if path.suffix.lower() == ".stl" else part
+
+
+def welded(part: tf.TriangleMesh) -> tf.TriangleMesh:
+    """The part with corners joined that differ by less than single precision resolves: an STL file keeps no indices.
+
+    Some tools join such corners themselves and some refuse a mesh whose corners are apart, so that only joining
+    them for all lets all do the same work.
+    """
+    vertices, triangles = np.asarray(part.vertices), np.asarray(part.triangles)
+    step = float(np.abs(vertices).max()) * float(np.finfo(np.float32).eps)
+    _, first, which = np.unique(np.round(vertices / step), axis=0, return_index=True, return_inverse=True)
+    joined = which.reshape(-1)[triangles]
+    whole = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
+    return tf.TriangleMesh(vertices[first], joined[whole], part.name)

@@ -36,17 +36,19 @@ def comparison(result: Result) -> str:
     }
     unit, name = (result.spacing, "error (cells)") if result.job == "band" else (result.diagonal, "error (of diagonal)")
     head = ["tool", "build + query", "of it build", "ns/sample", "ratio", name, "wrong signs", "peak MiB"]
-    rows = []
+    rows, notes = [], []
     for row in result.rows:
         if row.error:
-            rows.append([row.tool, row.error, *([""] * 6)])
+            rows.append([row.tool, *(["-"] * 7)])
+            notes.append(f"{row.tool}: {row.error}\n")
             continue
         wrong = f"{'~' if row.estimated else ''}{row.wrong_signs:.0f}"
         rows.append([
             row.tool, seconds(row.seconds), seconds(row.build), f"{row.per_sample:.1f}", f"{row.ratio:.2f}",
             f"{row.largest_error / unit:.1e}", wrong, f"{row.memory:.0f}",
         ])  # fmt: skip
-    return f"### {result.model} ({result.triangles} triangles): {titles[result.job]}\n\n{markdown(head, rows)}\n"
+    title = f"### {result.model} ({result.triangles} triangles): {titles[result.job]}"
+    return "\n".join([title, "", markdown(head, rows), "", *notes])
 
 
 def plain(made: dict[str, Any]) -> str:

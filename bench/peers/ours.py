@@ -32,7 +32,9 @@ class _Surface(Solver):
         with clock:
             sampled = self.surface.sample(resolution=max(lattice.shape), band=band, threads=self.threads)
         here, there = [*sampled.origin, sampled.spacing], [*lattice.first, lattice.spacing]
-        if sampled.shape != lattice.shape or not np.allclose(here, there, rtol=1e-12, atol=1e-12 * lattice.spacing):
+        if tuple(sampled.shape) != lattice.shape or not np.allclose(
+            here, there, rtol=1e-12, atol=1e-12 * lattice.spacing
+        ):
             raise ValueError(f"samples {sampled.shape} from {sampled.origin}, expected {lattice}")
         if values is not None:
             values[:] = np.where(np.isfinite(sampled.values), sampled.values, np.nan).reshape(-1)
