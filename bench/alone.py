@@ -84,8 +84,8 @@ def memory(threads: int, repeats: int, vertices: NDArray[np.float64], triangles:
         size = facts["bytes"] / 2**20
         per_cell, of_paper = facts["bytes"] / cells, facts["bytes"] / facts["paper_bytes"]
         rows.append([
-            str(resolution), _s(seconds), _n(cells), f"{facts['long'] / cells:.1%}", f"{size:.1f}", f"{per_cell:.2f}",
-            f"{of_paper:.2f}", f"{rise:.0f}", f"{rise / size:.1f}",
+            str(resolution), _s(seconds), _n(int(cells)), f"{facts['long'] / cells:.1%}", f"{size:.1f}",
+            f"{per_cell:.2f}", f"{of_paper:.2f}", f"{rise:.0f}", f"{rise / size:.1f}",
         ])  # fmt: skip
         del field
     head = ["resolution", "time", "cells", "ask the tree", "MiB", "bytes/cell", "of 4n+5", "peak MiB", "peak / size"]

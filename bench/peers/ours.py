@@ -13,6 +13,7 @@ from bench.peers.base import Peer, Solver
 
 if TYPE_CHECKING:
     import truefield as tf
+    from truefield.fields import Sign
 
 
 class _Surface(Solver):
@@ -49,7 +50,7 @@ class OnSurface(Peer):
     module = "truefield"
     precision = "float64"
 
-    def __init__(self, name: str, sign: str, jobs: tuple[str, ...]) -> None:
+    def __init__(self, name: str, sign: Sign, jobs: tuple[str, ...]) -> None:
         self.name, self.sign, self.jobs = name, sign, jobs
 
     def prepare(self, vertices: Floats, triangles: NDArray[np.int64], threads: int) -> Solver:

@@ -212,7 +212,8 @@ class CompleteField(_Answering):
     @property
     def shape(self) -> tuple[int, int, int]:
         """Number of cells along x, y and z."""
-        return self._native.grid[2]
+        x, y, z = self._native.grid[2]
+        return x, y, z
 
     @property
     def region(self) -> str:
@@ -328,7 +329,8 @@ class SampledField:
     @property
     def shape(self) -> tuple[int, int, int]:
         """Number of samples along x, y and z."""
-        return self._native.lattice[2]
+        x, y, z = self._native.lattice[2]
+        return x, y, z
 
     def distance(self, points: ArrayLike) -> Floats:
         """(n,) float64 trilinear interpolation of the samples, NaN outside the lattice; `bounds` says how good."""
