@@ -14,6 +14,7 @@ from solids import cube
 from test_io import BAD_FILES
 
 LINES = {
+    "info": ["info", "{part}"],
     "distance": ["distance", "{part}", "--points", "{points}", "-o", "{folder}/out.csv"],
 }
 
@@ -63,6 +64,7 @@ def test_missing_parts(truefield: Command, folder: Path, command: str, missing: 
     [
         ("distance", "threads", "0", "--threads"),
         ("distance", "sign", "guess", "--sign"),
+        ("info", "sign", "guess", "--sign"),
     ],
 )
 def test_bad_numbers(truefield: Command, folder: Path, *, command: str, option: str, value: str, named: str) -> None:
@@ -121,6 +123,8 @@ def test_unknown_kinds_of_output(truefield: Command, folder: Path, command: str)
     [
         ["frobnicate"],
         ["--frobnicate"],
+        ["info"],
+        ["info", "a.stl", "b.stl"],
         ["distance"],
         ["distance", "a.stl", "--points"],
         ["distance", "a.stl", "-o", "x.csv"],
@@ -145,6 +149,12 @@ def test_as_a_program_of_its_own(folder: Path) -> None:
     assert ended.returncode == 2
     assert ended.stdout == ""
     assert ended.stderr == f"truefield: cannot read '{folder / 'none.stl'}': there is no such file; check the name\n"
+
+
+def test_a_reader_that_goes_away_is_no_error(folder: Path) -> None:
+    words = f"'{sys.executable}' -m truefield info '{folder / 'cube.stl'}' --json | true"
+    ended = subprocess.run(words, shell=True, capture_output=True, text=True, check=False)
+    assert ended.stderr == ""
 
 
 def test_starting_loads_nothing_heavy() -> None:

@@ -2,6 +2,7 @@
 
 from truefield import shapes
 from truefield._truefield import __version__
+from truefield.check import MeshCheck
 from truefield.cloud import PointCloud
 from truefield.errors import FileError, TruefieldError
 from truefield.fields import CompleteField, Nearest, SampledField, SignRule, Surface, complete_field
@@ -11,6 +12,7 @@ from truefield.mesh import TriangleMesh
 __all__ = [
     "CompleteField",
     "FileError",
+    "MeshCheck",
     "Nearest",
     "PointCloud",
     "SampledField",

@@ -1,7 +1,7 @@
 """The compiled half of truefield."""
 
 from collections.abc import Callable
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,13 @@ _Floats = NDArray[np.float64]
 _Progress = Callable[[str, float], None] | None
 _NearestArrays = tuple[_Floats, _Floats, NDArray[np.int64], NDArray[np.uint8], _Floats]
 
-__all__ = ["Camera", "CompleteField", "SampledField", "Scene", "Surface", "__version__"]
+__all__ = ["Camera", "CompleteField", "SampledField", "Scene", "Surface", "__version__", "check_mesh"]
 
 __version__: str
+
+def check_mesh(
+    vertices: _Floats, triangles: NDArray[np.int64], threads: int | None = None, progress: _Progress = None
+) -> dict[str, Any]: ...
 
 @final
 class Surface:

@@ -1,5 +1,6 @@
 //! The Python extension module `truefield._truefield`: convert, one door, convert back.
 
+mod check;
 mod convert;
 mod door;
 mod field;
@@ -16,5 +17,6 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::PySampledField>()?;
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
+    module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
     Ok(())
 }

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from truefield.cli.distance import distance
+from truefield.cli.info import info
 
 app = typer.Typer(
     name="truefield",
@@ -16,7 +17,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command()(distance)
+for command in (info, distance):
+    app.command()(command)
 
 
 def _show_version(wanted: bool) -> None:
