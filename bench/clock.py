@@ -12,20 +12,22 @@ from types import TracebackType
 
 
 class Clock:
-    """Adds up the wall time of its `with` blocks."""
+    """Adds up the wall time and the processors' time of its `with` blocks."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
-        self._start = 0.0
+        self.processor = 0.0
+        self._start = (0.0, 0.0)
 
     def __enter__(self) -> Clock:
-        self._start = time.perf_counter()
+        self._start = time.perf_counter(), time.process_time()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.seconds += time.perf_counter() - self._start
+        self.seconds += time.perf_counter() - self._start[0]
+        self.processor += time.process_time() - self._start[1]
 
 
 class Peak:

@@ -29,6 +29,7 @@ class Row:
     release: str = ""
     build: float = 0.0
     seconds: float = 0.0
+    busy: float = 0.0
     count: int = 0
     per_sample: float = 0.0
     ratio: float = 0.0
@@ -95,7 +96,7 @@ def _row(tool: str, measured: dict[str, Any]) -> Row:
     count, release = measured["count"], measured["release"]
     return Row(
         tool, release=release, build=build, seconds=build + ask, count=count, memory=measured["memory"],
-        per_sample=(build + ask) / count * 1e9,
+        per_sample=(build + ask) / count * 1e9, busy=measured["busy"],
     )  # fmt: skip
 
 

@@ -35,17 +35,17 @@ def comparison(result: Result) -> str:
         "near": "random queries near the surface",
     }
     unit, name = (result.spacing, "error (cells)") if result.job == "band" else (result.diagonal, "error (of diagonal)")
-    head = ["tool", "build + query", "of it build", "ns/sample", "ratio", name, "wrong signs", "peak MiB"]
+    head = ["tool", "build + query", "of it build", "busy", "ns/sample", "ratio", name, "wrong signs", "peak MiB"]
     rows, notes = [], []
     for row in result.rows:
         if row.error:
-            rows.append([row.tool, *(["-"] * 7)])
+            rows.append([row.tool, *(["-"] * 8)])
             notes.append(f"{row.tool}: {row.error}\n")
             continue
         wrong = f"{'~' if row.estimated else ''}{row.wrong_signs:.0f}"
         rows.append([
-            row.tool, seconds(row.seconds), seconds(row.build), f"{row.per_sample:.1f}", f"{row.ratio:.2f}",
-            f"{row.largest_error / unit:.1e}", wrong, f"{row.memory:.0f}",
+            row.tool, seconds(row.seconds), seconds(row.build), f"{row.busy:.1f}", f"{row.per_sample:.1f}",
+            f"{row.ratio:.2f}", f"{row.largest_error / unit:.1e}", wrong, f"{row.memory:.0f}",
         ])  # fmt: skip
     title = f"### {result.model} ({result.triangles} triangles): {titles[result.job]}"
     return "\n".join([title, "", markdown(head, rows), "", *notes])

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -29,12 +28,11 @@ def compare(task: dict[str, Any]) -> dict[str, Any]:
     values = np.full(count, np.nan, dtype=peer.precision)
     peer.prepare(vertices[triangles[0]], np.array([[0, 1, 2]]), task["threads"])  # Imports, before memory is watched.
     values[:] = np.nan  # Its pages are there before memory is watched, too.
-    peak, builds, asks, memory = Peak(), [], [], 0.0
+    peak, builds, asks, memory, processor = Peak(), [], [], 0.0, 0.0
     for round_ in range(task["repeats"]):
-        start = time.perf_counter()
-        solver = peer.prepare(vertices, triangles, task["threads"])
-        builds.append(time.perf_counter() - start)
-        clock, keep = Clock(), values if round_ == 0 else None
+        build, clock, keep = Clock(), Clock(), values if round_ == 0 else None
+        with build:
+            solver = peer.prepare(vertices, triangles, task["threads"])
         if task["job"] == "band":
             solver.band(lattice, task["cells"], clock, keep)
         elif len(points):
@@ -46,12 +44,17 @@ def compare(task: dict[str, Any]) -> dict[str, Any]:
             del answer, native
         else:
             solver.grid(lattice, clock, keep)
+        builds.append(build.seconds)
         asks.append(clock.seconds)
+        processor += build.processor + clock.processor
         if round_ == 0:
             memory = peak.mebibytes()
         del solver
     np.save(task["answers"], values)
-    return {"build": builds, "ask": asks, "count": count, "memory": memory, "release": peers.release(peer)}
+    busy = processor / (sum(builds) + sum(asks))
+    return {
+        "build": builds, "ask": asks, "busy": busy, "count": count, "memory": memory, "release": peers.release(peer),
+    }  # fmt: skip
 
 
 def make_table(task: dict[str, Any]) -> dict[str, Any]:
