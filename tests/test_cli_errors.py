@@ -65,6 +65,9 @@ def test_missing_parts(truefield: Command, folder: Path, command: str, missing: 
         ("distance", "threads", "0", "--threads"),
         ("distance", "sign", "guess", "--sign"),
         ("info", "sign", "guess", "--sign"),
+        ("info", "weld", "-1", "within"),
+        ("distance", "weld", "nan", "within"),
+        ("distance", "weld", "50", "box"),
     ],
 )
 def test_bad_numbers(truefield: Command, folder: Path, *, command: str, option: str, value: str, named: str) -> None:

@@ -90,6 +90,23 @@ def test_the_check_of_a_good_part_finds_nothing() -> None:
     assert check.open_edges.first == ()
 
 
+def test_cracks_below_single_precision_get_a_hint_that_works(truefield: Command, tmp_path: Path) -> None:
+    part = tf.shapes.sphere(20.0, 2)
+    corners = part.corners.reshape(-1, 3)
+    corners[::7] += 1e-9
+    cracked = tf.TriangleMesh(corners, np.arange(len(corners)).reshape(-1, 3))
+    found = facts(truefield, cracked, tmp_path)
+    assert found["check"]["open_edges"]["count"] > 0
+    assert 1e-7 < found["weld_hint"] < 1e-5
+    assert "--weld" in truefield.done("info", tmp_path / "part.ply")
+    whole = json.loads(truefield.done("info", tmp_path / "part.ply", "--json", "--weld", found["weld_hint"]))
+    assert whole["problems"] == []
+    assert whole["weld_hint"] is None
+    assert whole["sign_rule"]["name"] == "pseudonormal"
+    half = tf.TriangleMesh(part.vertices, part.triangles[: len(part.triangles) // 2])
+    assert facts(truefield, half, tmp_path)["weld_hint"] is None
+
+
 def test_the_check_is_the_same_for_any_number_of_threads() -> None:
     mesh = tf.shapes.housing()
     assert mesh.check(threads=1) == mesh.check(threads=2) == mesh.check()

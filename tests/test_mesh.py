@@ -8,6 +8,7 @@ import pytest
 import truefield as tf
 from numpy.typing import ArrayLike
 from solids import CORNERS, blob, cube
+from truefield.weld import leaders
 
 TRIANGLE = [[0, 1, 2]]
 POINTS = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
@@ -77,6 +78,59 @@ def test_what_is_no_mesh_is_refused_in_one_sentence(vertices: ArrayLike, triangl
         tf.TriangleMesh(vertices, triangles)
     assert "\n" not in str(caught.value)
     assert isinstance(caught.value, ValueError)
+
+
+def split(mesh: tf.TriangleMesh, noise: float) -> tf.TriangleMesh:
+    """Every triangle with corners of its own, off by at most half the noise."""
+    generator = np.random.default_rng(2)
+    corners = mesh.corners.reshape(-1, 3)
+    shaken = corners + generator.uniform(-noise / 2, noise / 2, corners.shape)
+    return tf.TriangleMesh(shaken, np.arange(len(corners)).reshape(-1, 3), mesh.name)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-9])
+def test_welding_joins_what_nearly_coincides(noise: float) -> None:
+    part = blob()
+    apart = split(part, noise)
+    assert len(apart.vertices) == 3 * len(part.triangles)
+    whole = apart.weld(noise)
+    assert len(whole.vertices) == len(part.vertices)
+    assert whole.check().problems() == []
+    assert np.abs(whole.corners - apart.corners).max() <= noise
+    assert {tuple(vertex) for vertex in whole.vertices.tolist()} <= {
+        tuple(vertex) for vertex in apart.vertices.tolist()
+    }
+    assert whole.triangles[0].tolist() == [0, 1, 2]
+    assert whole.name == part.name
+
+
+def test_welding_keeps_what_is_farther_apart_and_every_triangle() -> None:
+    part = blob()
+    gaps = np.linalg.norm(part.vertices[:, None] - part.vertices[None], axis=2)
+    closest = gaps[gaps > 0].min()
+    same = part.weld(closest * 0.999)
+    assert np.array_equal(same.vertices, part.vertices)
+    assert np.array_equal(same.triangles, part.triangles)
+    coarse = part.weld(closest * 1.001)
+    assert len(coarse.vertices) == len(part.vertices) - 1
+    assert len(coarse.triangles) == len(part.triangles)
+
+
+@pytest.mark.parametrize("within", [0.0, 0.005, 0.02, 0.04])
+def test_groups_of_near_points_are_those_of_brute_force(within: float) -> None:
+    points = np.random.default_rng(4).random((800, 3)) * [1.0, 0.3, 0.1] - 5.0
+    points[7], points[9] = points[600], points[1]
+    near = np.linalg.norm(points[:, None] - points[None], axis=2) <= within
+    expected = np.arange(len(points))
+    while not np.array_equal(lowest := np.where(near, expected, len(points)).min(axis=1), expected):
+        expected = lowest
+    assert np.array_equal(leaders(points, within), expected)
+
+
+@pytest.mark.parametrize("within", [-1.0, np.nan, np.inf, 10.0])
+def test_welding_by_what_is_no_length_or_too_much_is_refused(within: float) -> None:
+    with pytest.raises(tf.TruefieldError):
+        cube().weld(within)
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".off"])

@@ -75,6 +75,23 @@ class TriangleMesh:
         found = _truefield.check_mesh(self._vertices, self._triangles, threads, progress)
         return MeshCheck.of(found)
 
+    def weld(self, within: float) -> TriangleMesh:
+        """A new mesh in which vertices that nearly coincide are one: a repair, done only because you ask for it.
+
+        Vertices joined by a chain of steps of at most `within` (model units) become the first of them. Vertices are
+        renumbered, triangles are not: those that lose an edge stay, with zero area.
+
+        Raises:
+            TruefieldError: `within` is no finite length, or nothing of the surface would be left.
+        """
+        if not 0.0 <= within < np.inf:
+            raise TruefieldError(f"within is {within}; give a finite length in model units, not negative")
+        from truefield.weld import leaders
+
+        leader = leaders(self._vertices, within)
+        kept = np.flatnonzero(leader == np.arange(len(leader)))
+        return TriangleMesh(self._vertices[kept], np.searchsorted(kept, leader)[self._triangles], self._name)
+
     def write(self, path: PathLike) -> None:
         """Writes the mesh; the suffix chooses the format.
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Part, Sign, SignRule, Threads
+from truefield.cli.options import Part, Sign, SignRule, Threads, Weld, load
 from truefield.cli.progress import progress
 
 
@@ -24,6 +24,7 @@ def distance(
         Path, typer.Option("--output", "-o", show_default=False, help="What to write: a .csv or .ply, one row a point.")
     ],
     sign: SignRule = Sign.AUTO,
+    weld: Weld = None,
     threads: Threads = None,
 ) -> None:
     """Exact distances of points, with bounds and nearest points.
@@ -38,7 +39,7 @@ def distance(
     table.check(output)
     files.check_file(output)
     asked = tf.read_points(points)
-    mesh = tf.read(part)
+    mesh = load(part, weld)
     with progress() as report:
         surface = tf.Surface(mesh, sign=sign.value, threads=threads, progress=report)
         nearest = surface.nearest(asked)

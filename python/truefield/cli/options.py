@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from truefield.mesh import TriangleMesh
 
 
 class Sign(str, Enum):
@@ -29,3 +32,19 @@ Threads = Annotated[
     int | None,
     typer.Option("--threads", min=1, show_default="every core", help="Worker threads; the results never depend on it."),
 ]
+Weld = Annotated[
+    float | None,
+    typer.Option(
+        "--weld",
+        show_default="none",
+        help="Join vertices whose coordinates differ by no more than this, as an STL with cracks may need.",
+    ),
+]
+
+
+def load(part: Path, weld: float | None) -> TriangleMesh:
+    """The mesh in a file, welded if that is asked for."""
+    from truefield.io import read
+
+    mesh = read(part)
+    return mesh if weld is None else mesh.weld(weld)

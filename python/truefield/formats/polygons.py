@@ -43,19 +43,13 @@ def merge_equal(soup: Soup) -> Soup:
 
     Only for formats that cannot share a vertex: without it no edge of theirs would have two triangles.
     """
-    positions = np.ascontiguousarray(soup.vertices + 0.0)
-    if len(positions) == 0 or not np.isfinite(positions).all():
+    from truefield.weld import leaders
+
+    if len(soup.vertices) == 0 or not np.isfinite(soup.vertices).all():
         return soup  # the mesh's own check names the vertex
-    order = np.lexsort(positions.T[::-1])
-    ordered = positions[order]
-    starts = np.concatenate(([True], (ordered[1:] != ordered[:-1]).any(axis=1)))
-    group = np.cumsum(starts) - 1
-    earliest = np.minimum.reduceat(order, np.flatnonzero(starts))
-    rank = np.empty(len(earliest), dtype=np.int64)
-    rank[np.argsort(earliest)] = np.arange(len(earliest))
-    renamed = np.empty(len(positions), dtype=np.int64)
-    renamed[order] = rank[group]
-    return Soup(positions[np.sort(earliest)], renamed[soup.triangles])
+    leader = leaders(soup.vertices, 0.0)
+    kept = np.flatnonzero(leader == np.arange(len(leader)))
+    return Soup(soup.vertices[kept] + 0.0, np.searchsorted(kept, leader)[soup.triangles])
 
 
 def numbers(tokens: Sequence[bytes], what: str) -> NDArray[np.float64]:
