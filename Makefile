@@ -46,7 +46,7 @@ bench: build $(VENV)/.peers ## compare with other tools (MODELS=DIR for your own
 
 docs: build ## reference pages into target/doc/
 	RUSTDOCFLAGS="-D warnings" cargo doc --quiet --locked --no-deps -p truefield
-	@mkdir -p target/doc/python && cd target/doc/python && "$(CURDIR)/$(BIN)/python" -m pydoc -w truefield >/dev/null
+	@mkdir -p target/doc/python && cd target/doc/python && "$(CURDIR)/$(BIN)/python" -m pydoc -w truefield truefield.shapes >/dev/null
 	@echo "Rust: target/doc/truefield/index.html   Python: target/doc/python/truefield.html"
 
 clean: ## remove everything that was built or fetched
