@@ -9,8 +9,10 @@ mod frame;
 pub(crate) mod intersect;
 mod nearest;
 mod order;
+mod ray;
 mod tree;
 pub mod winding;
 
 pub use nearest::Candidate;
+pub use ray::{Hit, Ray};
 pub use tree::Tree;

@@ -159,8 +159,8 @@ impl<'a> Octree<'a> {
 
     /// Looks at cells and keeps what `digest` makes of those that may reach deeper than asked for.
     ///
-    /// `enough` is a depth above which a lower bound settles a cell, so that no better upper bound
-    /// is needed. The result is as long as `asked`, `None` for cells that are not deep enough.
+    /// Where the cell is known to be deeper than `enough`, in one place or in all, the best upper
+    /// bound is not looked for. The result is as long as `asked`, `None` for cells that are not deep enough.
     pub fn look<T: Send>(
         &self,
         asked: &[Ask],
@@ -235,10 +235,7 @@ impl<'a> Octree<'a> {
         let distances = corners.map(|c| c.distance);
         let smallest = distances.iter().copied().fold(f64::INFINITY, f64::min);
         // 1-Lipschitz, counting corners outside as negative.
-        let reach = corners
-            .iter()
-            .map(|c| if c.side == Side::Outside { -c.distance } else { c.distance })
-            .fold(f64::INFINITY, f64::min);
+        let reach = corners.iter().map(|c| if c.side == Side::Outside { -c.distance } else { c.distance }).fold(f64::INFINITY, f64::min);
         let mut upper = reach + diagonal + self.rounding;
         if upper <= ask.exceed {
             return (None, upper);
@@ -271,7 +268,7 @@ impl<'a> Octree<'a> {
             for column in columns.iter() {
                 upper = upper.min(column.iter().copied().fold(0.0, f64::max) + self.rounding);
             }
-            if upper > ask.exceed && columns.len() > 1 {
+            if upper > ask.exceed && best <= enough && columns.len() > 1 {
                 let (value, mixture) = game::solve(columns);
                 upper = upper.min(value + self.rounding);
                 if upper > ask.exceed {

@@ -11,6 +11,9 @@ use crate::run::Run;
 /// Cells taken per round; each round is spread over all threads, so the result does not depend on them.
 const ROUND: usize = 1024;
 
+/// Cells looked at before the search ends with a wider interval: only where the side is doubtful all over.
+const BUDGET: usize = 20_000_000;
+
 /// The deepest place of a region and what is certain about its depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deepest {
@@ -60,10 +63,16 @@ impl Eq for Open {}
 
 /// For each region the deepest place, its depth enclosed to a width of `tolerance`.
 ///
-/// Regions without any point that is certainly inside keep `depth.lower` at negative infinity.
 /// A region is given up early, its interval still right, once it cannot be deeper than `floor`.
-pub(super) fn deepest(octree: &Octree<'_>, regions: Vec<Region>, tolerance: f64, floor: f64, phase: &'static str, run: &Run<'_>) -> Result<Vec<Deepest>> {
-    // Half for the search; what rounding adds fits into the rest.
+pub(super) fn deepest(
+    octree: &Octree<'_>,
+    regions: Vec<Region>,
+    tolerance: f64,
+    floor: f64,
+    phase: &'static str,
+    run: &Run<'_>,
+) -> Result<Vec<Deepest>> {
+    // What rounding adds fits into the rest.
     let slack = 0.9 * tolerance;
     let mut heap = BinaryHeap::new();
     // The greatest upper bound among the cells that were put aside, per region.
@@ -74,8 +83,8 @@ pub(super) fn deepest(octree: &Octree<'_>, regions: Vec<Region>, tolerance: f64,
             heap.push(Open { promise: promise(upper, best[region].0), upper, region, cell });
         }
     }
-    let mut rounds = 0;
-    while !heap.is_empty() {
+    let (mut rounds, mut looked) = (0, 0);
+    while !heap.is_empty() && looked < BUDGET {
         run.cancel.check()?;
         let mut asked = Vec::new();
         let mut owners = Vec::new();
@@ -108,7 +117,11 @@ pub(super) fn deepest(octree: &Octree<'_>, regions: Vec<Region>, tolerance: f64,
             }
         }
         rounds += 1;
+        looked += asked.len();
         run.progress.report(phase, rounds, rounds + heap.len().div_ceil(ROUND));
+    }
+    for open in heap {
+        aside[open.region] = aside[open.region].max(open.upper);
     }
     Ok(best
         .into_iter()

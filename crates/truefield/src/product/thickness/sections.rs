@@ -153,7 +153,8 @@ impl Search<'_> {
             volume = Interval { lower: content * share.lower, upper: content * share.upper };
             bounds = around;
             // Then any two deep points of cells that touch are joined as `joined_depth` says.
-            let small = square(self.octree.diagonal(view.cell.level)) <= self.tolerance * (self.depth - 0.75 * self.tolerance).max(self.tolerance / 64.0);
+            let small = square(self.octree.diagonal(view.cell.level))
+                <= self.tolerance * (self.depth - 0.75 * self.tolerance).max(self.tolerance / 64.0);
             let deep = view.best > self.depth - 0.5 * self.tolerance;
             state = if small && deep { State::Settled } else { State::Open };
         }

@@ -24,7 +24,8 @@ impl Linear {
     pub fn fit(values: &[f64; 8]) -> Self {
         let sign = |k: usize, axis: usize| if k >> axis & 1 == 1 { 1.0 } else { -1.0 };
         let middle = values.iter().sum::<f64>() / 8.0;
-        let slope = DVec3::from_array(std::array::from_fn(|axis| values.iter().enumerate().map(|(k, v)| v * sign(k, axis)).sum::<f64>() / 4.0));
+        let slope =
+            DVec3::from_array(std::array::from_fn(|axis| values.iter().enumerate().map(|(k, v)| v * sign(k, axis)).sum::<f64>() / 4.0));
         let at = |k: usize| middle + 0.5 * (slope.x * sign(k, 0) + slope.y * sign(k, 1) + slope.z * sign(k, 2));
         let residual = values.iter().enumerate().map(|(k, v)| (v - at(k)).abs()).fold(0.0, f64::max);
         Self { middle, slope, residual }
@@ -137,7 +138,8 @@ mod tests {
 
     #[test]
     fn half_spaces_match_counting() {
-        let slopes = [(1.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.3, -2.0, 0.7), (1e-5, 1.0, -0.2), (5.0, 4.0, 1.5), (1.0, 1e-9, -1e-9), (2.0, -2.0, 1e-3)];
+        let slopes =
+            [(1.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.3, -2.0, 0.7), (1e-5, 1.0, -0.2), (5.0, 4.0, 1.5), (1.0, 1e-9, -1e-9), (2.0, -2.0, 1e-3)];
         for (x, y, z) in slopes {
             let slope = DVec3::new(x, y, z);
             for step in -12..=12 {
@@ -162,7 +164,10 @@ mod tests {
         for _ in 0..200 {
             let c: [f64; 8] = std::array::from_fn(|_| random());
             let f = |p: DVec3| {
-                c[0] + c[1] * p.x + c[2] * p.y + c[3] * p.z + 0.3 * (c[4] * p.x * p.y + c[5] * p.y * p.z + c[6] * p.z * p.x + c[7] * p.x * p.y * p.z)
+                c[0] + c[1] * p.x
+                    + c[2] * p.y
+                    + c[3] * p.z
+                    + 0.3 * (c[4] * p.x * p.y + c[5] * p.y * p.z + c[6] * p.z * p.x + c[7] * p.x * p.y * p.z)
             };
             let linear = Linear::fit(&corners(f));
             let truth = counted(f);
