@@ -4,7 +4,7 @@ mod nasty;
 
 use std::sync::Arc;
 
-use nasty::{Kind, Nasty, corpus, judge, shapes};
+use nasty::{Kind, Nasty, corpus, judge, judged, shapes};
 use truefield::laws::{
     BruteForce, check_closest, check_extent, check_lipschitz, check_many, check_normal, check_range, check_threads, check_truth, places,
 };
@@ -17,14 +17,6 @@ fn diagonal(nasty: &Nasty) -> f64 {
 
 fn surface(nasty: &Nasty, sign: SignChoice) -> Surface {
     Surface::new(Arc::new(nasty.mesh.clone()), sign, &Run::with_threads(2)).unwrap_or_else(|error| panic!("{}: {error}", nasty.name))
-}
-
-/// Brute force for many points, on two threads.
-fn judged<T: Send>(points: &[DVec3], judge: impl Fn(DVec3) -> T + Sync) -> Vec<T> {
-    let blocks = Run::with_threads(2).blocks("judge", points.len().div_ceil(256), |block| {
-        Ok(points[block * 256..((block + 1) * 256).min(points.len())].iter().map(|&p| judge(p)).collect::<Vec<T>>())
-    });
-    blocks.expect("a verdict").into_iter().flatten().collect()
 }
 
 /// The true signed distance of a watertight mesh.

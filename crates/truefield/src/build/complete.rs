@@ -10,7 +10,7 @@ use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
 use crate::bvh::{Candidate, Tree};
 use crate::error::{Error, Result};
 use crate::field::CompleteField;
-use crate::field::complete::{ABSENT, CELLS, CellBlock, CellClass, CellList, CellWord, EDGE, Entries, LONG, Region};
+use crate::field::complete::{ABSENT, CELLS, CellBlock, CellClass, CellList, CellWord, EDGE, Entries, LONG, Region, block_range};
 use crate::geom::{Aabb, DVec3, triangle_overlaps_box};
 use crate::grid::Grid;
 use crate::run::Run;
@@ -30,8 +30,8 @@ const LONGEST: usize = 64;
 /// The lists take at most `budget` bytes: where they would take more, the longest are replaced by a
 /// search of the tree, until they fit. Every query stays exact.
 pub fn complete(surface: &Arc<Surface>, grid: &Grid, region: Region, budget: u64, run: &Run<'_>) -> Result<CompleteField> {
-    let shape = grid.shape.map(|n| u64::from(n).div_ceil(EDGE as u64));
-    let count = shape.iter().try_fold(1u64, |product, &n| product.checked_mul(n)).unwrap_or(u64::MAX);
+    let (low, shape) = block_range(grid);
+    let count = shape.iter().try_fold(1u64, |product, &n| product.checked_mul(n as u64)).unwrap_or(u64::MAX);
     let needed = count.saturating_mul(size_of::<CellBlock>() as u64);
     if needed > budget {
         let [x, y, z] = grid.shape;
@@ -52,8 +52,8 @@ pub fn complete(surface: &Arc<Surface>, grid: &Grid, region: Region, budget: u64
     let mut blocks = vec![CellBlock::default(); count as usize];
     let mut filled = 0;
     for (place, block) in parts.into_iter().flatten() {
-        let [a, b, c] = place.map(|i| i as usize);
-        blocks[(a * shape[1] as usize + b) * shape[2] as usize + c] = block;
+        let [a, b, c] = std::array::from_fn(|axis| (place[axis] - low[axis]) as usize);
+        blocks[(a * shape[1] + b) * shape[2] + c] = block;
         filled += 1;
     }
     debug_assert_eq!(filled, count);

@@ -35,7 +35,7 @@ pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64,
     if band.is_nan() || band <= 0.0 {
         return Err(Error::invalid(format!("the band must be a positive length, not {band}")));
     }
-    let needed = lattice.shape.iter().map(|&n| u64::from(n)).product::<u64>() * 4;
+    let needed = lattice.shape.iter().fold(size_of::<f32>() as u64, |bytes, &n| bytes.saturating_mul(u64::from(n)));
     if needed > memory {
         let [x, y, z] = lattice.shape;
         return Err(Error::Memory { what: format!("a lattice of {x} x {y} x {z} samples"), needed, allowed: memory });

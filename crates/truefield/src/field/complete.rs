@@ -174,6 +174,17 @@ pub struct CompleteField {
     pub(crate) blocks: Vec<CellBlock>,
 }
 
+/// The blocks that hold the cells of `grid`: global index of the first, and how many along each axis.
+///
+/// Blocks start at multiples of their edge, wherever the grid starts.
+pub(crate) fn block_range(grid: &Grid) -> ([i64; 3], [usize; 3]) {
+    let edge = EDGE as i64;
+    let low = grid.first.map(|i| i.div_euclid(edge));
+    let shape =
+        std::array::from_fn(|axis| ((grid.first[axis] + i64::from(grid.shape[axis]) + edge - 1).div_euclid(edge) - low[axis]) as usize);
+    (low, shape)
+}
+
 /// A cell's triangles, or where to start a search.
 enum Found<'a> {
     List(&'a CellBlock, usize),
@@ -198,7 +209,7 @@ impl CompleteField {
 
     /// Blocks along each axis.
     pub(crate) fn block_shape(&self) -> [usize; 3] {
-        self.grid.shape.map(|n| (n as usize).div_ceil(EDGE))
+        block_range(&self.grid).1
     }
 
     /// Class and list length of a cell; `None` for the length where the tree answers.
@@ -209,8 +220,11 @@ impl CompleteField {
         (class, length)
     }
 
-    fn place(&self, cell: [usize; 3]) -> (&CellBlock, usize) {
+    fn place(&self, mut cell: [usize; 3]) -> (&CellBlock, usize) {
         let shape = self.block_shape();
+        for axis in 0..3 {
+            cell[axis] += self.grid.first[axis].rem_euclid(EDGE as i64) as usize;
+        }
         let [a, b, c] = cell.map(|i| i / EDGE);
         let [i, j, k] = cell.map(|i| i % EDGE);
         (&self.blocks[(a * shape[1] + b) * shape[2] + c], (i * EDGE + j) * EDGE + k)
@@ -222,10 +236,11 @@ impl CompleteField {
         let mut cell = [0; 3];
         for axis in 0..3 {
             let count = f64::from(self.grid.shape[axis]);
-            if !(index[axis] >= 0.0 && index[axis] < count) {
+            let local = index[axis] - self.grid.first[axis] as f64;
+            if !(local >= 0.0 && local < count) {
                 return (Found::Start(0), CellClass::Undecided);
             }
-            cell[axis] = index[axis] as usize;
+            cell[axis] = local as usize;
         }
         let (block, at) = self.place(cell);
         let (held, class) = block.cell(at);
@@ -353,6 +368,6 @@ impl Closest for CompleteField {
     fn nearest(&self, p: DVec3, within: f64) -> Option<Nearest> {
         let (found, _) = self.search(p);
         let scale = self.surface.scale();
-        (found.distance_squared <= (within * scale) * (within * scale)).then(|| self.surface.describe(p * scale, found))
+        (found.distance_squared.sqrt() / scale <= within).then(|| self.surface.describe(p * scale, found))
     }
 }

@@ -47,7 +47,8 @@ impl SampledField {
     /// The interval that contains the true distance at sample `index`.
     pub fn interval(&self, index: usize) -> Interval {
         let value = self.values[index];
-        if f64::from(value.abs()) >= self.band {
+        // Samples beyond the band hold the band itself, as rounded to a single.
+        if value.abs() >= self.band as f32 {
             let beyond = Interval { lower: f64::from((self.band as f32).next_down()), upper: f64::INFINITY };
             return if value > 0.0 { beyond } else { Interval { lower: -beyond.upper, upper: -beyond.lower } };
         }

@@ -4,7 +4,7 @@
 pub mod judge;
 pub mod shapes;
 
-use truefield::{DVec3, TriangleMesh};
+use truefield::{DVec3, Run, TriangleMesh};
 
 /// What is known of a mesh's inside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,4 +104,12 @@ pub fn corpus() -> Vec<Nasty> {
 fn turned(v: DVec3) -> DVec3 {
     let (x, y) = (DVec3::new(2.0, -1.0, 2.0) / 3.0, DVec3::new(2.0, 2.0, -1.0) / 3.0);
     x * v.x + y * v.y + x.cross(y) * v.z
+}
+
+/// Brute force for many points, on two threads.
+pub fn judged<T: Send>(points: &[DVec3], judge: impl Fn(DVec3) -> T + Sync) -> Vec<T> {
+    let blocks = Run::with_threads(2).blocks("judge", points.len().div_ceil(256), |block| {
+        Ok(points[block * 256..((block + 1) * 256).min(points.len())].iter().map(|&p| judge(p)).collect::<Vec<T>>())
+    });
+    blocks.expect("a verdict").into_iter().flatten().collect()
 }
