@@ -49,12 +49,6 @@ impl Boundary {
         self.nodes.is_empty()
     }
 
-    /// Total length in model units.
-    #[cfg(test)]
-    pub fn length(&self) -> f64 {
-        self.nodes.first().map_or(0.0, |root| root.length)
-    }
-
     fn add(&mut self, items: &mut [(Aabb, f64)]) {
         let index = self.nodes.len();
         let bounds = items.iter().fold(Aabb::EMPTY, |b, item| b.union(item.0));
@@ -102,5 +96,52 @@ impl Boundary {
             }
         }
         sum * (1.0 + 1e-9) / (4.0 * PI)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::winding::triangle;
+
+    /// The winding number of a fan over a ring changes no faster than the bound, and the bound is of use.
+    #[test]
+    fn no_step_is_steeper_than_the_bound() {
+        let mut state = 7u64;
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let ring: Vec<DVec3> = (0..50)
+            .map(|i| {
+                let f = f64::from(i) / 50.0 * 2.0 * PI;
+                DVec3::new(f.cos(), f.sin(), 0.3 * (3.0 * f).sin())
+            })
+            .collect();
+        let mut vertices = ring;
+        vertices.push(DVec3::new(0.1, 0.2, 0.4));
+        let triangles: Vec<[u32; 3]> = (0..50).map(|i| [i, (i + 1) % 50, 50]).collect();
+        let mesh = TriangleMesh::new(vertices, triangles).expect("a mesh");
+        let edges: Vec<([u32; 2], u32)> = (0..50).map(|i| ([i, (i + 1) % 50], 1)).collect();
+        let boundary = Boundary::new(&mesh, &edges);
+        let length: f64 = edges.iter().map(|(e, _)| (mesh.vertices()[e[1] as usize] - mesh.vertices()[e[0] as usize]).length()).sum();
+        assert!((boundary.nodes[0].length / length - 1.0).abs() < 1e-6);
+        let winding = |p: DVec3| (0..50).map(|t| triangle(&mesh.corners(t), p).value).sum::<f64>();
+        let (mut tried, mut sharpest) = (0, 0.0f64);
+        for _ in 0..200_000 {
+            let p = DVec3::new(random() - 0.5, random() - 0.5, random() - 0.5) * 6.0;
+            let radius = random() * random();
+            let steepest = boundary.steepest(p, radius);
+            let to = p + DVec3::new(random() - 0.5, random() - 0.5, random() - 0.5).normalize_or_zero() * radius;
+            let step = (winding(to) - winding(p)).abs();
+            // The fan itself may be crossed: a jump of a whole turn.
+            if step < 0.5 && steepest.is_finite() {
+                tried += 1;
+                assert!(step <= steepest * radius, "{p} to {to}: {step} > {}", steepest * radius);
+                sharpest = sharpest.max(step / (steepest * radius));
+            }
+        }
+        assert!(tried > 100_000 && sharpest > 0.3, "{tried} {sharpest}");
+        assert!(Boundary::new(&mesh, &[]).is_empty() && Boundary::new(&mesh, &[]).steepest(DVec3::ZERO, 1.0) == 0.0);
     }
 }

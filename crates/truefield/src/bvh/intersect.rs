@@ -270,7 +270,7 @@ fn slope_at_edge(edge: [DVec3; 2], first: DVec3, second: DVec3) -> f64 {
         (across.normalize_or_zero(), 16.0 * UNIT * w.length() / across.length())
     });
     let noise = arms[0].1 + arms[1].1;
-    if !(noise < 1e-3) {
+    if noise.is_nan() || noise > 1e-3 {
         return 0.0;
     }
     let (cosine, sine) = (arms[0].0.dot(arms[1].0), arms[0].0.cross(arms[1].0).length());

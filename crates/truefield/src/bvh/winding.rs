@@ -114,7 +114,7 @@ struct Moments {
 
 impl Winding {
     /// Builds the tree over triangles given by their corners; a triangle given twice counts twice.
-    /// O(n log n).
+    /// None at all have the winding number 0 everywhere. O(n log n).
     pub fn build(triangles: &[[DVec3; 3]], run: &Run<'_>) -> Result<Self> {
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         let middles: Vec<DVec3> = triangles.iter().map(middle).collect();
@@ -218,7 +218,7 @@ pub fn triangle(corners: &[DVec3; 3], p: DVec3) -> Estimate {
     let size = numerator.hypot(denominator);
     let noise = TRIANGLE_ROUNDING * lengths;
     // Too near a corner or an edge, or in the plane of the triangle: either side.
-    if !(size > 8.0 * noise) || lengths < 1e-130 || (denominator < 8.0 * noise && numerator.abs() <= noise) {
+    if size <= 8.0 * noise || lengths < 1e-130 || (denominator < 8.0 * noise && numerator.abs() <= noise) {
         return Estimate { value: 0.0, error: DOUBT, doubt: DOUBT };
     }
     // An arctangent turns by at most 1.01 * noise / size here.
@@ -326,7 +326,7 @@ impl Builder<'_> {
             parts.push(right);
         }
         let mut all = Vec::with_capacity(WIDTH);
-        for (lane, part) in parts.into_iter().enumerate() {
+        for (lane, part) in parts.into_iter().filter(|part| !part.is_empty()).enumerate() {
             let (child, moments) = if part.len() <= WIDTH { self.packet(part) } else { self.node(part, run)? };
             let radius = part
                 .iter()
@@ -344,7 +344,7 @@ impl Builder<'_> {
         let mut packet = Packet { corners: [[[0.0; WIDTH]; 3]; 3], count: order.len() };
         let mut all = Vec::with_capacity(WIDTH);
         for lane in 0..WIDTH {
-            let corners = self.triangles[order[lane.min(order.len().saturating_sub(1))] as usize];
+            let corners = self.triangles[order[lane.min(order.len() - 1)] as usize];
             for (k, corner) in corners.iter().enumerate() {
                 for axis in 0..3 {
                     packet.corners[k][axis][lane] = corner[axis];
@@ -447,4 +447,139 @@ impl Moments {
 fn middle(corners: &[DVec3; 3]) -> DVec3 {
     let [a, b, c] = *corners;
     a + ((b - a) + (c - a)) / 3.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn random(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        }
+    }
+
+    /// Triangles of all shapes and sizes: clusters, slivers, points, far from the origin too.
+    fn soup(seed: u64, count: usize, offset: f64) -> Vec<[DVec3; 3]> {
+        let mut r = random(seed);
+        let mut any = move |size: f64| DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * size;
+        (0..count)
+            .map(|i| {
+                let at = any(2.0) + DVec3::splat(offset);
+                let size = 10f64.powf(f64::from(i as u32 % 5) - 4.0);
+                let (u, v) = (any(size), any(size));
+                match i % 7 {
+                    0 => [at, at + u, at + u * 0.5 + v * 1e-6],
+                    1 => [at, at, at],
+                    2 => [at, at + u, at + u * 3.0],
+                    _ => [at, at + u, at + v],
+                }
+            })
+            .collect()
+    }
+
+    fn near(triangles: &[[DVec3; 3]], r: &mut impl FnMut() -> f64) -> DVec3 {
+        let [a, b, c] = triangles[(r() * triangles.len() as f64) as usize];
+        let away = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * 10f64.powf(2.0 - 18.0 * r());
+        let (s, t) = (r() * 1.2, r() * 1.2);
+        a + (b - a) * s + (c - a) * t + away
+    }
+
+    #[test]
+    fn whatever_the_moments_leave_out_is_within_the_error() {
+        for (seed, count, offset) in [(1, 1, 0.0), (2, 8, 0.0), (3, 9, 0.0), (4, 700, 0.0), (5, 700, 1e5), (6, 3000, 3.0)] {
+            let triangles = soup(seed, count, offset);
+            let winding = Winding::build(&triangles, &Run::default()).expect("a tree");
+            let mut r = random(seed + 100);
+            let tries = 2_000_000 / (count + 400);
+            let mut sharp = 0;
+            for index in 0..tries {
+                let p = near(&triangles, &mut r);
+                let exact = winding.exact(p);
+                sharp += usize::from(exact.error < 1e-9);
+                let accuracy = 10f64.powf(1.0 - 8.0 * r());
+                let quick = winding.number(p, accuracy);
+                assert!(quick.error <= accuracy || quick.error <= exact.error, "{index}: {p} {quick:?} {exact:?} for {accuracy}");
+                assert!((quick.value - exact.value).abs() <= quick.error + exact.error, "{index}: {p} {quick:?} {exact:?}");
+                // Every group that refinement passes through encloses the truth too.
+                let first = winding.refine(p, |_| true);
+                assert!((first.value - exact.value).abs() <= first.error + exact.error, "{index}: {p} {first:?} {exact:?}");
+            }
+            assert!(sharp > tries / 2, "{sharp} of {tries}");
+        }
+    }
+
+    #[test]
+    fn groups_hold_their_bound_one_by_one() {
+        // Node by node, against the sum over its own triangles: sharper than any total.
+        let triangles = soup(8, 640, 0.0);
+        let winding = Winding::build(&triangles, &Run::default()).expect("a tree");
+        let mut r = random(9);
+        let (mut held, mut sharpest) = (0, 0.0f64);
+        for node in &winding.nodes {
+            for _ in 0..500 {
+                let p = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * 10f64.powf(3.0 * r());
+                let mut lanes = Values { value: [0.0; WIDTH], error: [0.0; WIDTH] };
+                node_values(node, p, &mut lanes);
+                for lane in (0..WIDTH).filter(|&lane| node.child[lane] & LEAF != 0 && node.child[lane] != u32::MAX) {
+                    let packet = &winding.packets[(node.child[lane] & !LEAF) as usize];
+                    let (mut sum, mut error) = (0.0, 0.0);
+                    for k in 0..packet.count {
+                        let corners = std::array::from_fn(|i| DVec3::from_array(std::array::from_fn(|axis| packet.corners[i][axis][k])));
+                        let one = triangle(&corners, p);
+                        (sum, error) = (sum + one.value, error + one.error);
+                    }
+                    let off = (lanes.value[lane] - sum).abs();
+                    assert!(off <= lanes.error[lane] + error, "{p}: {off} > {} + {error}", lanes.error[lane]);
+                    if lanes.error[lane] < node.most[lane] {
+                        held += 1;
+                        sharpest = sharpest.max((off - error) / lanes.error[lane]);
+                    }
+                }
+            }
+        }
+        // The bound is not idle either.
+        assert!(held > 10_000 && sharpest > 0.05, "{held} {sharpest}");
+    }
+
+    #[test]
+    fn single_triangles_in_lanes_and_alone() {
+        let triangles = soup(11, 8, 0.0);
+        let winding = Winding::build(&triangles, &Run::default()).expect("a tree");
+        let mut r = random(12);
+        for _ in 0..200_000 {
+            let p = near(&triangles, &mut r);
+            let mut lanes = Values { value: [0.0; WIDTH], error: [0.0; WIDTH] };
+            packet_values(&winding.packets[0], p, &mut lanes);
+            for lane in 0..WIDTH {
+                let packet = &winding.packets[0];
+                let corners = std::array::from_fn(|i| DVec3::from_array(std::array::from_fn(|axis| packet.corners[i][axis][lane])));
+                let one = triangle(&corners, p);
+                assert!((one.value - lanes.value[lane]).abs() <= lanes.error[lane] + one.error, "{p} {one:?}");
+            }
+        }
+        for _ in 0..1_000_000 {
+            let (y, x) = ((r() - 0.5) * 10f64.powf(20.0 * r() - 10.0), r() - 0.5);
+            assert!((arctangent(y, x) - y.atan2(x)).abs() <= ARCTANGENT_ERROR, "{y} {x}");
+        }
+        for (y, x) in [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0), (1.0, 1.0), (-1.0, -1.0), (1e-300, 1e-300)] {
+            assert!((arctangent(y, x) - f64::atan2(y, x)).abs() <= ARCTANGENT_ERROR, "{y} {x}");
+        }
+    }
+
+    #[test]
+    fn a_solid_angle_is_known_where_symmetry_says_so() {
+        // Half a face of a cube: a twelfth from the middle; a 48th from the opposite corner, where three faces fill an eighth.
+        let face = [DVec3::new(-1.0, -1.0, 1.0), DVec3::new(1.0, -1.0, 1.0), DVec3::new(1.0, 1.0, 1.0)];
+        let one = triangle(&face, DVec3::ZERO);
+        assert!((one.value - 1.0 / 12.0).abs() <= one.error && one.error < 1e-13, "{one:?}");
+        let corner = triangle(&face, DVec3::new(-1.0, -1.0, -1.0));
+        assert!((corner.value - 1.0 / 48.0).abs() <= corner.error, "{corner:?}");
+        // In the plane beside it: nothing, and certain. In the plane on it: doubt.
+        assert!(triangle(&face, DVec3::new(3.0, 0.0, 1.0)).error < 1e-13);
+        assert_eq!(triangle(&face, DVec3::new(0.5, 0.0, 1.0)).doubt, 0.5);
+        assert_eq!(Winding::build(&[], &Run::default()).expect("a tree").number(DVec3::ONE, 0.0).value, 0.0);
+    }
 }

@@ -11,6 +11,7 @@ use crate::run::Run;
 
 use super::layers::Layers;
 use super::pseudonormal::rounding;
+use super::well_sized;
 
 /// Finds that are named; the others are only counted.
 const NAMED: usize = 8;
@@ -101,6 +102,8 @@ impl Check {
     /// Looks at everything. O(n log n), about a microsecond a triangle; self-intersections cost
     /// more where very many triangles meet.
     pub fn of(mesh: &TriangleMesh, run: &Run<'_>) -> Result<Self> {
+        let (scaled, scale) = well_sized(mesh)?;
+        let mesh = scaled.as_ref().unwrap_or(mesh);
         let topology = Topology::new(mesh);
         run.cancel.check()?;
         let mut check = Self::of_edges(mesh, &topology);
@@ -108,6 +111,8 @@ impl Check {
         check.add_shells(mesh, &topology, &winding, run)?;
         let tree = Tree::build(mesh, run)?;
         check.add_intersections(mesh, &topology, &tree, ENOUGH, run)?;
+        check.area /= scale * scale;
+        check.volume /= scale * scale * scale;
         Ok(check)
     }
 
@@ -312,7 +317,7 @@ const REACH: f64 = 1.0 / 1_048_576.0;
 fn flat(corners: &[DVec3; 3]) -> bool {
     let [a, b, c] = *corners;
     let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-    !((b - a).cross(c - a).length() > 8.0 * f64::EPSILON * longest)
+    (b - a).cross(c - a).length() <= 8.0 * f64::EPSILON * longest
 }
 
 /// The mean of the winding numbers on the two sides of a triangle: its own share there is half up, half down,

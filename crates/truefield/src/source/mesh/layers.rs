@@ -54,7 +54,7 @@ impl Layers {
         }
         let weight: Vec<i64> = (0..count)
             .map(|t| {
-                let counts = copied[t] && !(saved[sets.find(t as u32) as usize] > 0.0);
+                let counts = copied[t] && saved[sets.find(t as u32) as usize] <= 0.0;
                 if counts { 1 } else { i64::from(once[t]) }
             })
             .collect();

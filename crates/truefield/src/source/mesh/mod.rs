@@ -39,13 +39,8 @@ pub struct Surface {
 impl Surface {
     /// Builds the tree and finds the sign rule. O(n log n).
     pub fn new(mesh: Arc<TriangleMesh>, sign: SignChoice, run: &Run<'_>) -> Result<Self> {
-        let scale = power_of_two(mesh.extent().diagonal());
-        let work = if scale == 1.0 {
-            Arc::clone(&mesh)
-        } else {
-            let vertices = mesh.vertices().iter().map(|&v| v * scale).collect();
-            Arc::new(TriangleMesh::new(vertices, mesh.triangles().to_vec())?)
-        };
+        let (scaled, scale) = well_sized(&mesh)?;
+        let work = scaled.map_or_else(|| Arc::clone(&mesh), Arc::new);
         let tree = Tree::build(&work, run)?;
         let signs = Signs::new(&work, &tree, sign, run)?;
         Ok(Self { mesh, work, scale, tree, signs })
@@ -208,6 +203,16 @@ pub(crate) fn check_points(points: &[DVec3]) -> Result<()> {
         Some(index) => Err(Error::invalid(format!("point {index} is {}; all points must be finite numbers", points[index]))),
         None => Ok(()),
     }
+}
+
+/// The mesh times a power of two, where its size calls for one, and that power.
+fn well_sized(mesh: &TriangleMesh) -> Result<(Option<TriangleMesh>, f64)> {
+    let scale = power_of_two(mesh.extent().diagonal());
+    if scale == 1.0 {
+        return Ok((None, scale));
+    }
+    let vertices = mesh.vertices().iter().map(|&v| v * scale).collect();
+    Ok((Some(TriangleMesh::new(vertices, mesh.triangles().to_vec())?), scale))
 }
 
 /// 1 for ordinary sizes, else the power of two that brings `size` near 1.

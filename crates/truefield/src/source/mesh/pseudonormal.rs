@@ -101,7 +101,7 @@ impl Pseudonormals {
         let away = p - nearest.point;
         let distance = away.length();
         let off = self.rounding.max(64.0 * UNIT * p.abs().max_element());
-        if !(distance > 8.0 * off) {
+        if distance <= 8.0 * off {
             return None;
         }
         let t = triangle as usize;
@@ -118,7 +118,7 @@ impl Pseudonormals {
             None => 0.0,
             Some(&[gap, slope]) => {
                 let clear = f64::from(gap).min(f64::from(slope) * (reach(&mesh.corners(triangle), nearest) - off)) * 0.5;
-                if !(clear > 4.0 * off) {
+                if clear <= 4.0 * off {
                     return None;
                 }
                 let ball = clear.min((2.0 * distance * off).sqrt()).min(distance);
@@ -137,7 +137,7 @@ fn face(corners: &[DVec3; 3]) -> Pseudonormal {
     let (ab, ac) = (b - a, c - a);
     let cross = ab.cross(ac);
     let length = cross.length();
-    if !(length > 0.0) {
+    if length == 0.0 {
         return Pseudonormal::default();
     }
     Pseudonormal { sum: cross / length, error: 8.0 * UNIT * (ab.length() * ac.length() / length + 1.0) }
