@@ -12,13 +12,19 @@ from typing import Any, Final
 from truefield.errors import TruefieldError
 from truefield.mesh import TriangleMesh
 from truefield.shapes.analytic import box, cylinder, plate, sphere, torus, wedge
+from truefield.shapes.brevi import brevi
+from truefield.shapes.connector import connector
+from truefield.shapes.cylinder_head import cylinder_head
 from truefield.shapes.housing import housing
 from truefield.shapes.simple import cube, one_ended_tooth, six_pointed_star, tetrahedron, two_ended_tooth
 
 __all__ = [
     "box",
+    "brevi",
+    "connector",
     "cube",
     "cylinder",
+    "cylinder_head",
     "housing",
     "make",
     "names",
@@ -37,7 +43,7 @@ _MAKERS: Final[dict[str, Callable[..., TriangleMesh]]] = {
     for maker in (
         *(box, plate, wedge, cylinder, torus, sphere),
         *(cube, tetrahedron, one_ended_tooth, two_ended_tooth, six_pointed_star),
-        housing,
+        *(connector, brevi, housing, cylinder_head),
     )
 }
 

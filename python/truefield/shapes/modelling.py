@@ -136,6 +136,12 @@ def extruded(outline: Sequence[tuple[float, float]], start: float, end: float) -
     return solid_of_rings([np.column_stack([flat, np.full(len(flat), z)]) for z in (start, end)])
 
 
+def block(low: Vector, high: Vector) -> Any:
+    """The box between two corners."""
+    size = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    return _checked(Manifold.cube(size).translate(low))
+
+
 def hull(points: Sequence[Vector]) -> Any:
     """The convex hull of points."""
     return _checked(Manifold.hull_points(np.asarray(points, dtype=np.float64)))
