@@ -10,7 +10,7 @@ _Floats = NDArray[np.float64]
 _Progress = Callable[[str, float], None] | None
 _NearestArrays = tuple[_Floats, _Floats, NDArray[np.int64], NDArray[np.uint8], _Floats]
 
-__all__ = ["Camera", "CompleteField", "SampledField", "Scene", "Surface", "__version__", "check_mesh"]
+__all__ = ["Camera", "CompleteField", "SampledField", "Scene", "Surface", "__version__", "check_mesh", "contour"]
 
 __version__: str
 
@@ -155,3 +155,13 @@ class Scene:
         threads: int | None = None,
         progress: _Progress = None,
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
+
+def contour(
+    surface: Surface,
+    distance: float,
+    tolerance: float,
+    placement: str,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[_Floats, _Floats, NDArray[np.int64]]: ...

@@ -1,6 +1,7 @@
 //! The Python extension module `truefield._truefield`: convert, one door, convert back.
 
 mod check;
+mod contour;
 mod convert;
 mod door;
 mod field;
@@ -18,5 +19,6 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(contour::contour_of, module)?)?;
     Ok(())
 }

@@ -6,12 +6,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use super::sides::Sides;
+use crate::bvh::cover::Range;
 use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
-use crate::bvh::{Candidate, Tree};
 use crate::error::{Error, Result};
 use crate::field::CompleteField;
 use crate::field::complete::{ABSENT, CELLS, CellBlock, CellClass, CellList, CellWord, EDGE, Entries, LONG, Region, block_range};
-use crate::geom::{Aabb, DVec3, triangle_overlaps_box};
+use crate::geom::triangle_overlaps_box;
 use crate::grid::Grid;
 use crate::run::Run;
 use crate::source::mesh::{Side, Surface};
@@ -43,7 +44,7 @@ pub fn complete(surface: &Arc<Surface>, grid: &Grid, region: Region, budget: u64
     let parts = run.blocks("complete field", tiles.len(), |index| {
         let mut builder = Builder::new(surface, region);
         let mut descent = Descent::new(surface.tree(), &scaled, Span::Cells);
-        descent.tile(tiles[index], TILE, f64::INFINITY, &mut |visit| {
+        descent.tile(tiles[index], TILE, Range::ALL, &mut |visit| {
             run.cancel.check()?;
             builder.visit(visit)
         })?;
@@ -141,17 +142,15 @@ impl Draft {
 /// The blocks of one tile.
 struct Builder<'a> {
     surface: &'a Surface,
-    tree: &'a Tree,
     region: Region,
     done: Vec<([i64; 3], CellBlock)>,
     current: Option<([i64; 3], Draft)>,
-    /// The last block off the surface and its class.
-    settled: Option<(Block, CellClass)>,
+    sides: Sides<'a>,
 }
 
 impl<'a> Builder<'a> {
     fn new(surface: &'a Surface, region: Region) -> Self {
-        Self { surface, tree: surface.tree(), region, done: Vec::new(), current: None, settled: None }
+        Self { surface, region, done: Vec::new(), current: None, sides: Sides::new(surface) }
     }
 
     fn visit(&mut self, at: Visit<'_>) -> Result<Step> {
@@ -159,7 +158,7 @@ impl<'a> Builder<'a> {
         if edge > EDGE as i64 {
             return Ok(Step::Refine);
         }
-        let settled = self.class_off_surface(&at);
+        let settled = self.sides.of_block(&at).map(|side| class(Some(side)));
         match settled {
             Some(CellClass::Outside) if self.region == Region::Inside => {
                 self.fill(&at.block, CellClass::Outside, None);
@@ -180,51 +179,9 @@ impl<'a> Builder<'a> {
         Ok(if at.list.len() <= SHORT && settled.is_some() { Step::Share } else { Step::Refine })
     }
 
-    /// The class of a block that no triangle touches.
-    fn class_off_surface(&mut self, at: &Visit<'_>) -> Option<CellClass> {
-        if let Some((block, class)) = self.settled {
-            if (0..3).all(|axis| block.low[axis] <= at.block.low[axis] && at.block.high[axis] <= block.high[axis]) {
-                return Some(class);
-            }
-        }
-        if at.range.lower <= 0.0 {
-            return None;
-        }
-        let class = self.side_class(&at.cell, at.list);
-        if class == CellClass::Undecided && at.block.edge() > 1 {
-            return None;
-        }
-        self.settled = Some((at.block, class));
-        Some(class)
-    }
-
     fn class_of_cell(&self, at: &Visit<'_>) -> CellClass {
-        let touched = at.list.iter().any(|&t| triangle_overlaps_box(self.corners(t), &at.cell));
-        if touched { CellClass::Surface } else { self.side_class(&at.cell, at.list) }
-    }
-
-    /// The one side of a box that no triangle touches.
-    fn side_class(&self, cell: &Aabb, list: &[u32]) -> CellClass {
-        let center = cell.center();
-        let mut best = Candidate::within(f64::INFINITY);
-        for &triangle in list {
-            best.offer(self.tree.facet(triangle).distance_squared(center), triangle);
-        }
-        let foot = self.tree.facet(best.triangle).nearest(center);
-        let side = if self.surface.side_changes_at_surface_only() {
-            Some(self.surface.side(center, &foot, best.triangle))
-        } else {
-            self.surface.side_of_ball(center, &foot, best.triangle, cell.radius())
-        };
-        match side {
-            Some(Side::Inside) => CellClass::Inside,
-            Some(Side::Outside) => CellClass::Outside,
-            _ => CellClass::Undecided,
-        }
-    }
-
-    fn corners(&self, triangle: u32) -> [DVec3; 3] {
-        self.surface.work().corners(triangle)
+        let touched = at.list.iter().any(|&t| triangle_overlaps_box(self.surface.work().corners(t), &at.cell));
+        if touched { CellClass::Surface } else { class(self.sides.of_clear_box(at)) }
     }
 
     fn fill(&mut self, block: &Block, class: CellClass, list: Option<&[u32]>) {
@@ -254,5 +211,14 @@ impl<'a> Builder<'a> {
     fn finish(mut self) -> Vec<([i64; 3], CellBlock)> {
         self.seal();
         self.done
+    }
+}
+
+/// The class of cells on one side, `None` where that is not certain.
+fn class(side: Option<Side>) -> CellClass {
+    match side {
+        Some(Side::Inside) => CellClass::Inside,
+        Some(Side::Outside) => CellClass::Outside,
+        _ => CellClass::Undecided,
     }
 }

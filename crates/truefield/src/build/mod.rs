@@ -2,3 +2,4 @@
 
 pub mod complete;
 pub mod sampled;
+pub(crate) mod sides;

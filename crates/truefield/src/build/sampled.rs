@@ -6,13 +6,14 @@
 
 use std::sync::{Mutex, PoisonError};
 
+use super::sides::{Sides, slots};
+use crate::bvh::Tree;
+use crate::bvh::cover::Range;
 use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
 use crate::bvh::evaluate::{Answers, BLOCK, Points, Rows, evaluate};
-use crate::bvh::{Candidate, Tree};
 use crate::error::{Error, Result};
 use crate::field::SampledField;
 use crate::field::sampled::Continuity;
-use crate::geom::DVec3;
 use crate::grid::Grid;
 use crate::run::Run;
 use crate::source::mesh::{Side, Surface};
@@ -62,8 +63,8 @@ pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64,
         let mut sampler = Sampler::new(surface, &scaled, band * scale, tile);
         let mut descent = Descent::new(surface.tree(), &scaled, Span::Points);
         // Sides of far tiles of an open mesh may differ from sample to sample: they need their lists.
-        let within = if surface.side_changes_at_surface_only() { band * scale } else { f64::INFINITY };
-        descent.tile(tile, TILE, within, &mut |visit| {
+        let upper = if surface.side_changes_at_surface_only() { band * scale } else { f64::INFINITY };
+        descent.tile(tile, TILE, Range { lower: 0.0, upper }, &mut |visit| {
             run.cancel.check()?;
             Ok(sampler.visit(visit))
         })?;
@@ -90,8 +91,7 @@ struct Sampler<'a> {
     tile: Block,
     values: Vec<f32>,
     doubtful: Vec<u64>,
-    /// The last block off the surface and its side.
-    settled: Option<(Block, Side)>,
+    sides: Sides<'a>,
     rows: Rows,
     answers: Answers,
 }
@@ -107,14 +107,14 @@ impl<'a> Sampler<'a> {
             tile,
             values: vec![0.0; count],
             doubtful: Vec::new(),
-            settled: None,
+            sides: Sides::new(surface),
             rows: Rows::default(),
             answers: Answers::NONE,
         }
     }
 
     fn visit(&mut self, at: Visit<'_>) -> Step {
-        let side = self.side_of(&at);
+        let side = self.sides.of_block(&at);
         if at.range.lower > self.band {
             if let Some(side) = side {
                 let value = (side.sign() * self.band / self.surface.scale()) as f32;
@@ -125,65 +125,19 @@ impl<'a> Sampler<'a> {
         if at.block.edge() > EDGE {
             return if at.list.len() <= SHORT && self.band == f64::INFINITY { Step::Share } else { Step::Refine };
         }
-        let points = block_points(self.lattice, &at.block);
-        evaluate(self.tree, &at.cell, &points, at.list, &mut self.rows, &mut self.answers);
+        let points = Points::of_block(self.lattice, &at.block);
+        evaluate(self.tree, &at.cell, &points, at.list, Range::ALL, &mut self.rows, &mut self.answers);
         let sides = match side {
             Some(side) => [side; BLOCK],
-            None => self.sides(&at.block, &points),
+            None => self.sides.of_points(&at.block, self.lattice.spacing, &points, &self.answers),
         };
         self.store(&at.block, &sides);
         Step::Done
     }
 
-    /// The side of a whole block, if it is certain to have one.
-    fn side_of(&mut self, at: &Visit<'_>) -> Option<Side> {
-        if let Some((block, side)) = self.settled {
-            let within = (0..3).all(|axis| block.low[axis] <= at.block.low[axis] && at.block.high[axis] <= block.high[axis]);
-            if within {
-                return Some(side);
-            }
-        }
-        if at.range.lower <= 0.0 {
-            return None;
-        }
-        let center = at.cell.center();
-        let found = self.tree.nearest(center, Candidate::within(f64::INFINITY));
-        let foot = self.tree.facet(found.triangle).nearest(center);
-        let side = if self.surface.side_changes_at_surface_only() {
-            Some(self.surface.side(center, &foot, found.triangle)).filter(|side| side.is_certain())
-        } else {
-            self.surface.side_of_ball(center, &foot, found.triangle, at.cell.radius())
-        }?;
-        self.settled = Some((at.block, side));
-        Some(side)
-    }
-
-    /// The side of every point of a block, asking only where no neighbour can tell.
-    fn sides(&self, block: &Block, points: &Points) -> [Side; BLOCK] {
-        let mut sides = [Side::Outside; BLOCK];
-        let distance: [f64; BLOCK] = std::array::from_fn(|i| self.answers.squared[i].sqrt());
-        let hand_on = self.surface.side_changes_at_surface_only();
-        // Two balls that meet leave no room for the surface between their centres.
-        let step = self.lattice.spacing * (1.0 + 1e-9);
-        for (i, local) in indices(block) {
-            let told = [(local[2] > 0, 1), (local[1] > 0, 4), (local[0] > 0, 16)]
-                .into_iter()
-                .find(|&(exists, back)| hand_on && exists && distance[i] + distance[i - back] > step && sides[i - back].is_certain());
-            sides[i] = match told {
-                Some((_, back)) => sides[i - back],
-                None => {
-                    let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
-                    let triangle = self.answers.triangle[i];
-                    self.surface.side(p, &self.tree.facet(triangle).nearest(p), triangle)
-                }
-            };
-        }
-        sides
-    }
-
     fn store(&mut self, block: &Block, sides: &[Side; BLOCK]) {
         let (scale, limit) = (self.surface.scale(), (self.band / self.surface.scale()) as f32);
-        for (i, local) in indices(block) {
+        for (i, local) in slots(block) {
             let value = (self.answers.squared[i].sqrt() / scale) as f32;
             let at = self.index([0, 1, 2].map(|axis| block.low[axis] + local[axis]));
             self.values[at] = sides[i].sign() as f32 * value.min(limit);
@@ -225,21 +179,4 @@ impl<'a> Sampler<'a> {
             slab[at..at + length].copy_from_slice(values);
         }
     }
-}
-
-/// The points of a block of at most 4 x 4 x 4; slots beyond a clipped block repeat its last points.
-fn block_points(lattice: &Grid, block: &Block) -> Points {
-    let mut points = Points { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
-    let at = |axis: usize, step: usize| (block.low[axis] + step as i64).min(block.high[axis] - 1);
-    for i in 0..BLOCK {
-        let p = lattice.corner(at(0, i >> 4), at(1, i >> 2 & 3), at(2, i & 3));
-        (points.x[i], points.y[i], points.z[i]) = (p.x, p.y, p.z);
-    }
-    points
-}
-
-/// The slots of a block that hold its points, with their position in it.
-fn indices(block: &Block) -> impl Iterator<Item = (usize, [i64; 3])> + use<> {
-    let size: [i64; 3] = std::array::from_fn(|axis| block.high[axis] - block.low[axis]);
-    (0..size[0]).flat_map(move |i| (0..size[1]).flat_map(move |j| (0..size[2]).map(move |k| ((i * 16 + j * 4 + k) as usize, [i, j, k]))))
 }

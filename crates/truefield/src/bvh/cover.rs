@@ -22,6 +22,11 @@ pub(crate) struct Range {
     pub upper: f64,
 }
 
+impl Range {
+    /// All distances.
+    pub const ALL: Self = Self { lower: 0.0, upper: f64::INFINITY };
+}
+
 /// Memory that is used again from box to box.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
@@ -29,16 +34,17 @@ pub(crate) struct Scratch {
     stack: Vec<u32>,
 }
 
-/// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending, if the surface
-/// comes within `within` of it.
-pub(crate) fn gather(tree: &Tree, cell: &Aabb, within: f64, scratch: &mut Scratch, out: &mut Vec<u32>) -> Range {
+/// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending, if distances in
+/// `window` can occur there.
+pub(crate) fn gather(tree: &Tree, cell: &Aabb, window: Range, scratch: &mut Scratch, out: &mut Vec<u32>) -> Range {
     let center = cell.center();
     let first = tree.nearest(center, Candidate::within(f64::INFINITY));
     let witness = tree.facets[first.triangle as usize].nearest(center).point;
     let distance = first.distance_squared.sqrt();
-    if distance - cell.radius() > within {
+    let range = Range { lower: (distance - cell.radius()).max(0.0), upper: distance + cell.radius() };
+    if range.lower > window.upper || range.upper < window.lower {
         out.clear();
-        return Range { lower: distance - cell.radius(), upper: distance + cell.radius() };
+        return range;
     }
     let mut rough = Vec::new();
     collect(tree, cell, witness, &mut scratch.stack, &mut rough);

@@ -28,6 +28,11 @@ impl Block {
         (0..3).map(|axis| self.high[axis] - self.low[axis]).max().unwrap_or(0)
     }
 
+    /// Whether `other` is part of it.
+    pub fn holds(&self, other: &Self) -> bool {
+        (0..3).all(|axis| self.low[axis] <= other.low[axis] && other.high[axis] <= self.high[axis])
+    }
+
     /// The space it stands for.
     pub fn extent(&self, lattice: &Grid, span: Span) -> Aabb {
         let last = match span {
@@ -117,11 +122,11 @@ impl<'a> Descent<'a> {
 
     /// Visits `tile`, whose edge is at most `edge` (a power of two), and its parts.
     ///
-    /// A tile with nothing within `within` is shown with its range and no list.
-    pub fn tile(&mut self, tile: Block, edge: i64, within: f64, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
+    /// A tile where no distance in `window` can occur is shown with its range and no list.
+    pub fn tile(&mut self, tile: Block, edge: i64, window: Range, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
         let cell = tile.extent(self.lattice, self.span);
         let mut list = self.lists.pop().unwrap_or_default();
-        let range = gather(self.tree, &cell, within, &mut self.scratch, &mut list);
+        let range = gather(self.tree, &cell, window, &mut self.scratch, &mut list);
         let result = self.block(Visit { block: tile, cell, range, list: &list }, edge, visit);
         self.lists.push(list);
         result

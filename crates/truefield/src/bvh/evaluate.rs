@@ -4,10 +4,12 @@
 //! nearest within its error; those are asked again in double precision, in lanes. The result has
 //! the bits of brute force.
 
-use super::cover::filter_error;
+use super::cover::{Range, filter_error};
+use super::descend::Block;
 use super::frame::Offsets;
 use super::tree::Tree;
 use crate::geom::{Aabb, DVec3};
+use crate::grid::Grid;
 use crate::simd::{Fuse, multiversion};
 
 /// Points of a block: 4 x 4 x 4.
@@ -34,6 +36,19 @@ pub(crate) struct Answers {
     pub triangle: [u32; BLOCK],
 }
 
+impl Points {
+    /// The points of a block of at most 4 x 4 x 4; slots beyond a clipped block repeat its last points.
+    pub fn of_block(lattice: &Grid, block: &Block) -> Self {
+        let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+        let at = |axis: usize, step: usize| (block.low[axis] + step as i64).min(block.high[axis] - 1);
+        for i in 0..BLOCK {
+            let p = lattice.corner(at(0, i >> 4), at(1, i >> 2 & 3), at(2, i & 3));
+            (points.x[i], points.y[i], points.z[i]) = (p.x, p.y, p.z);
+        }
+        points
+    }
+}
+
 impl Answers {
     pub const NONE: Self = Self { squared: [f64::INFINITY; BLOCK], triangle: [u32::MAX; BLOCK] };
 }
@@ -44,11 +59,21 @@ pub(crate) struct Rows(Vec<[[f32; LANES]; PARTS]>);
 
 multiversion!(
     /// Nearest triangles of `points`, all inside `cell`, from its complete ascending list.
-    pub(crate) fn evaluate(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32], rows: &mut Rows, out: &mut Answers) = evaluate_body
+    ///
+    /// Points whose unsigned distance is certainly not in `window` may be left without an answer.
+    pub(crate) fn evaluate(
+        tree: &Tree,
+        cell: &Aabb,
+        points: &Points,
+        list: &[u32],
+        window: Range,
+        rows: &mut Rows,
+        out: &mut Answers,
+    ) = evaluate_body
 );
 
 #[inline(always)]
-fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32], rows: &mut Rows, out: &mut Answers) {
+fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32], window: Range, rows: &mut Rows, out: &mut Answers) {
     *out = Answers::NONE;
     if let [only] = list {
         let every: [u8; BLOCK] = std::array::from_fn(|i| i as u8);
@@ -77,9 +102,12 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32
     }
     // Both sides of a comparison may be off by the error.
     let error = filter_error(tree, cell) as f32;
+    let (low, high) = ((window.lower * (1.0 - 1e-6)) as f32 - error, (window.upper * (1.0 + 1e-6)) as f32 + error);
     for lane in least.as_flattened_mut() {
-        let reach = lane.sqrt() + 2.0 * error;
-        *lane = reach * reach * (1.0 + 8.0 * f32::EPSILON);
+        let distance = lane.sqrt();
+        let reach = distance + 2.0 * error;
+        let reach = reach * reach * (1.0 + 8.0 * f32::EPSILON);
+        *lane = if (distance < low) | (distance > high) { -1.0 } else { reach };
     }
     for (&triangle, row) in list.iter().zip(rows.iter()) {
         let mut chosen = [0u8; BLOCK + LANES];

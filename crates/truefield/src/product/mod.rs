@@ -1,4 +1,5 @@
 //! What people want from a field or a mesh.
 
+pub mod contour;
 pub mod render;
 pub mod thickness;

@@ -138,6 +138,19 @@ impl Surface {
         if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
     }
 
+    /// Unit gradient of the signed distance at `p`, whose nearest point is `foot`, in the tree's units.
+    pub(crate) fn normal(&self, p: DVec3, foot: &FacetPoint, triangle: u32, side: Side) -> DVec3 {
+        let [a, b, c] = self.work.corners(triangle);
+        let face = (b - a).cross(c - a).normalize_or_zero();
+        let away = (p - foot.point).normalize_or_zero() * side.sign();
+        // Off the face's interior (C2, C3) the gradient is the direction from the nearest point; on the surface only the face is left.
+        match foot.feature {
+            Feature::Face if face != DVec3::ZERO => face * if face.dot(away) < 0.0 { -1.0 } else { 1.0 },
+            _ if away == DVec3::ZERO => face,
+            _ => away,
+        }
+    }
+
     /// The range over a box from the interval at its centre: a signed distance is 1-Lipschitz where the
     /// side changes at the surface only; its absolute value always is.
     pub(crate) fn over_from(&self, center: Interval, cell: &Aabb) -> Interval {
@@ -148,15 +161,7 @@ impl Surface {
     /// The answer in model units for `p` and its nearest triangle in the tree's.
     pub(crate) fn describe(&self, p: DVec3, found: Candidate) -> Nearest {
         let (foot, side) = self.foot_and_side(p, found);
-        let [a, b, c] = self.work.corners(found.triangle);
-        let face = (b - a).cross(c - a).normalize_or_zero();
-        let away = (p - foot.point).normalize_or_zero() * side.sign();
-        // Off the face's interior (C2, C3) the gradient is the direction from the nearest point; on the surface only the face is left.
-        let normal = match foot.feature {
-            Feature::Face if face != DVec3::ZERO => face * if face.dot(away) < 0.0 { -1.0 } else { 1.0 },
-            _ if away == DVec3::ZERO => face,
-            _ => away,
-        };
+        let normal = self.normal(p, &foot, found.triangle, side);
         let point = match foot.feature {
             Feature::Vertex(corner) => self.mesh.corners(found.triangle)[usize::from(corner)],
             _ => foot.point / self.scale,
