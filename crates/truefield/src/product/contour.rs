@@ -81,7 +81,7 @@ pub fn contour(surface: &Surface, distance: f64, tolerance: f64, placement: Plac
         let samples = tracer.out.points.len() as u64;
         let needed = (count.fetch_add(samples, Ordering::Relaxed) + samples) * BYTES;
         if needed > memory {
-            return Err(Error::Memory { what: format!("a contour at tolerance {tolerance}"), needed, allowed: memory });
+            return Err(Error::Memory { what: format!("a contour at tolerance {tolerance:?}"), needed, allowed: memory });
         }
         Ok(tracer.out)
     })?;
@@ -102,7 +102,7 @@ fn lattice(surface: &Surface, distance: f64, tolerance: f64) -> Result<Grid> {
         return Err(Error::invalid(format!("the contour's distance must be a finite length, not {distance}")));
     }
     if !(tolerance > 0.0 && tolerance.is_finite()) {
-        return Err(Error::invalid(format!("the tolerance must be a positive length, not {tolerance}")));
+        return Err(Error::invalid(format!("the tolerance must be a positive length, not {tolerance:?}")));
     }
     let grown = extent.grow(distance.max(0.0) + tolerance);
     let reach = grown.min.abs().max(grown.max.abs()).max_element();
@@ -110,7 +110,7 @@ fn lattice(surface: &Surface, distance: f64, tolerance: f64) -> Result<Grid> {
     let least = (reach * 1e-13).max(grown.size().max_element() / 2e9);
     if spacing < least {
         return Err(Error::invalid(format!(
-            "a tolerance of {tolerance} is far below what rounding allows for coordinates up to {reach}; use at least {:.1e}",
+            "a tolerance of {tolerance:?} is far below what rounding allows for coordinates up to {reach}; use at least {:.1e}",
             least * 2.0
         )));
     }
