@@ -14,6 +14,7 @@ from solids import cube
 from test_io import BAD_FILES
 
 LINES = {
+    "contour": ["contour", "{part}", "--depth", "0.2", "--tolerance", "0.1", "-o", "{folder}/out.ply"],
     "info": ["info", "{part}"],
     "distance": ["distance", "{part}", "--points", "{points}", "-o", "{folder}/out.csv"],
 }
@@ -62,6 +63,18 @@ def test_missing_parts(truefield: Command, folder: Path, command: str, missing: 
 @pytest.mark.parametrize(
     ("command", "option", "value", "named"),
     [
+        ("contour", "tolerance", "0", "tolerance"),
+        ("contour", "tolerance", "-1", "tolerance"),
+        ("contour", "tolerance", "nan", "tolerance"),
+        ("contour", "tolerance", "1e-30", "tolerance"),
+        ("contour", "tolerance", "fine", "--tolerance"),
+        ("contour", "depth", "nan", "nan"),
+        ("contour", "depth", "inf", "inf"),
+        ("contour", "depth", "0.6", "0.6"),
+        ("contour", "depth", "1e6", "depth"),
+        ("contour", "threads", "0", "--threads"),
+        ("contour", "sign", "guess", "--sign"),
+        ("contour", "placement", "anywhere", "--placement"),
         ("distance", "threads", "0", "--threads"),
         ("distance", "sign", "guess", "--sign"),
         ("info", "sign", "guess", "--sign"),
@@ -97,7 +110,7 @@ def test_bad_points(truefield: Command, folder: Path, name: str, content: bytes 
     assert not list((folder / "out").iterdir())
 
 
-@pytest.mark.parametrize("command", ["distance"])
+@pytest.mark.parametrize("command", ["distance", "contour"])
 @pytest.mark.parametrize("place", ["none/out.ply", "cube.stl/out.ply", "/proc/self/out.ply"])
 def test_unwritable_places(truefield: Command, folder: Path, command: str, place: str) -> None:
     if place.startswith("/") and not Path(place).parent.is_dir():
@@ -107,7 +120,7 @@ def test_unwritable_places(truefield: Command, folder: Path, command: str, place
     assert sorted(folder.rglob("*")) == before
 
 
-@pytest.mark.parametrize(("command", "place"), [("distance", "out")])
+@pytest.mark.parametrize(("command", "place"), [("distance", "out"), ("contour", "out")])
 def test_a_file_for_a_folder_and_a_folder_for_a_file(
     truefield: Command, folder: Path, command: str, place: str
 ) -> None:
@@ -116,7 +129,7 @@ def test_a_file_for_a_folder_and_a_folder_for_a_file(
     assert len(tf.read(folder / "cube.stl").triangles) == 12
 
 
-@pytest.mark.parametrize("command", ["distance"])
+@pytest.mark.parametrize("command", ["distance", "contour"])
 def test_unknown_kinds_of_output(truefield: Command, folder: Path, command: str) -> None:
     assert ".csv" in truefield.refused(*line(command, folder, output=str(folder / "out" / "out.xlsx")))
 
@@ -128,6 +141,8 @@ def test_unknown_kinds_of_output(truefield: Command, folder: Path, command: str)
         ["--frobnicate"],
         ["info"],
         ["info", "a.stl", "b.stl"],
+        ["contour", "a.stl"],
+        ["contour", "a.stl", "--depth"],
         ["distance"],
         ["distance", "a.stl", "--points"],
         ["distance", "a.stl", "-o", "x.csv"],

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from truefield.cli.contour import contour
 from truefield.cli.distance import distance
 from truefield.cli.info import info
 
@@ -17,7 +18,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (info, distance):
+for command in (info, contour, distance):
     app.command()(command)
 
 
