@@ -68,7 +68,7 @@ def test_missing_parts(truefield: Command, folder: Path, command: str, missing: 
         ("contour", "tolerance", "nan", "tolerance"),
         ("contour", "tolerance", "1e-30", "tolerance"),
         ("contour", "tolerance", "fine", "--tolerance"),
-        ("contour", "depth", "nan", "nan"),
+        ("contour", "depth", "nan", "NaN"),
         ("contour", "depth", "inf", "inf"),
         ("contour", "depth", "0.6", "0.6"),
         ("contour", "depth", "1e6", "depth"),
