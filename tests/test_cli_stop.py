@@ -64,4 +64,4 @@ def test_ctrl_c_while_starting_is_no_traceback() -> None:
     code = "import signal, os; from truefield.cli import main; import typer; "
     code += "typer.echo = lambda *_: os.kill(os.getpid(), signal.SIGINT); raise SystemExit(main(['--version']))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "truefield: stopped\n")
+    assert (ended.returncode, ended.stdout, ended.stderr.strip()) == (130, "", "truefield: stopped")

@@ -48,7 +48,8 @@ def _load(data: bytes, kind: str, path: Path) -> Scene:
     resolver = trimesh.resolvers.FilePathResolver(str(path.resolve()))
     try:
         with warnings.catch_warnings(), _complaints() as complaints:
-            warnings.simplefilter("error")  # numpy only warns where text stops being numbers
+            # Older numpy only warns where text stops being numbers.
+            warnings.filterwarnings("error", message="string or file could not be read to its end")
             scene = trimesh.load_scene(
                 BytesIO(data), file_type=kind, resolver=resolver, allow_remote=False, process=False
             )
