@@ -114,3 +114,15 @@ def climb(mesh: TriangleMesh, place: Array, step: float, shrink: float = 1e-6) -
         else:
             size *= 0.5
     return value, place
+
+
+def winding_numbers(mesh: TriangleMesh, points: Array) -> Array:
+    """(n,) generalised winding numbers: solid angles of all triangles, after van Oosterom and Strackee, summed."""
+    found = np.empty(len(points))
+    for k, point in enumerate(points):
+        a, b, c = np.moveaxis(mesh.corners - point, 1, 0)
+        x, y, z = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        volume = (a * np.cross(b, c)).sum(axis=1)
+        rest = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y
+        found[k] = np.arctan2(volume, rest).sum() / (2.0 * np.pi)
+    return found

@@ -47,6 +47,11 @@ def test_every_shape_is_one_closed_outward_solid_without_flat_triangles(name: st
 
 
 @pytest.mark.parametrize("name", shapes.names())
+def test_the_mesh_report_finds_nothing_wrong_with_a_shape(name: str) -> None:
+    assert _made(name).check().problems() == []
+
+
+@pytest.mark.parametrize("name", shapes.names())
 def test_a_shape_is_the_same_every_time(name: str) -> None:
     first, second = _made(name), shapes.make(name)
     assert first.vertices.tobytes() == second.vertices.tobytes()

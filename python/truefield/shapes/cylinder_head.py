@@ -47,12 +47,12 @@ def cylinder_head() -> TriangleMesh:
 
     Fire deck with domed chambers, water jacket, two intake and two exhaust ports per cylinder that bend from the valves
     to the manifold flanges, valve guides, plug tubes, bolt columns, camshaft bridges, oil galleries, cover rail, ribs.
-    137,774 triangles, none of them split for the count alone. Four solid bracket bosses are deeper than 9, two of them
+    135,652 triangles, none of them split for the count alone. Four solid bracket bosses are deeper than 9, two of them
     deeper than 10, greatest depth 10.6; of the rest nearly all lies within 6 of the surface. Takes about a second.
     """
     casting = less(union([*_shell(), *_flanges()]), _rooms())
     casting = union([casting, *_ports(grown=_PORT_WALL), *_columns(), *_bridges(), *_rail_bosses(), *_heavy_places()])
-    return finished(less(casting, [*_ports(grown=0.0), *_machining()]), "cylinder head", smallest=0.02)
+    return finished(less(casting, [*_ports(grown=0.0), *_machining()]), "cylinder head", smallest=0.01)
 
 
 def _along(solid: Any) -> Any:
@@ -129,7 +129,7 @@ def _ports(grown: float) -> list[Any]:
             (58.0, spread, _PORT_HEIGHT),
             (end, spread, _PORT_HEIGHT),
         ]
-        t = np.linspace(0.0, 1.0, 29)
+        t = np.linspace(0.0, 1.0, 26)
         line = _bezier(np.array(knots), t) * (side, 1.0, 1.0)
         solids.append(duct(line, narrow + grown + (wide - narrow) * t, 40))
     return solids
