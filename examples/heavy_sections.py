@@ -25,7 +25,7 @@ def main() -> None:
     report.write("heavy-sections")
 
     # The core of the heavy sections: all places exactly half the limit deep.
-    shell = tf.Surface(part).contour(-0.5 * limit, tolerance=0.05)
+    shell = tf.Surface(part).contour(-0.5 * limit, tolerance=0.2)
     shell.write("heavy-sections.ply")
 
 
