@@ -55,7 +55,7 @@ def _skin() -> list[Any]:
 
 
 def _gusset(x: float, side: float) -> Any:
-    """A triangular rib from the flange up the long side of the body, 4.2 thick at its foot and a fifth less at its edge."""
+    """A rib from the flange up the long side of the body, 4.2 thick at its foot and a fifth less at its edge."""
     return hull(
         [
             (x + dx * taper, side * y, z)
