@@ -193,7 +193,7 @@ def thickness_picture(
         words = f"Thickest place: a ball of diameter {number(2.0 * radius)} fits in"
         half = 0.5 * width_of(words, text)
         middle = min(max(0.5 * (box[0] + box[2]), edge + half), size[0] - edge - half)
-        write(draw, (middle, size[1] - edge), words, text, anchor="ms")
+        write(draw, (middle, box[3] + 1.6 * text), words, text, anchor="ms")
     return _finished(page, path)
 
 

@@ -124,8 +124,8 @@ mod tests {
         let samples = SurfaceSamples::new(&points, &normals, &values).unwrap();
         for (x, y) in [(30.0, 30.0), (20.4, 11.7), (44.5, 50.2)] {
             let found = samples.at(DVec3::new(x, y, 0.0), DVec3::Z);
-            assert!((found - x).abs() < 0.15, "{found} at {x}");
-            assert_eq!(samples.at(DVec3::new(x, y, 0.0), -DVec3::Z), 100.0);
+            assert!((found - x).abs() < 0.25, "{found} at {x}");
+            assert!((samples.at(DVec3::new(x, y, 0.0), -DVec3::Z) - 100.0).abs() < 1e-9);
         }
         assert!((samples.at(DVec3::new(62.5, 30.0, 0.0), DVec3::Z) - 59.0).abs() < 1.0);
         assert!(samples.at(DVec3::new(900.0, 0.0, 0.0), DVec3::Z).is_nan());
