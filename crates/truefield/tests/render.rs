@@ -1,5 +1,7 @@
 //! Pictures against what geometry says they must show.
 
+#![allow(clippy::unwrap_used)]
+
 use truefield::product::render::{
     Background, Camera, Canvas, Finish, Ink, Paint, Picture, Projection, Ramp, Samples, Scene, View, covering_radius, render,
 };

@@ -104,6 +104,7 @@ fn cell(point: DVec3, edge: f64) -> [i64; 3] {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 
