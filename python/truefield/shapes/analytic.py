@@ -49,8 +49,7 @@ def unit_circle(segments: int) -> Points:
     return np.round(corners * 2.0**40) / 2.0**40
 
 
-def positive(name: str, values: Sequence[float]) -> None:
-    """Refuses lengths that are not above zero and finite."""
+def _positive(name: str, values: Sequence[float]) -> None:
     if not all(math.isfinite(value) and value > 0.0 for value in values):
         raise TruefieldError(f"{name} must be positive and finite, not {tuple(values)}: give lengths above zero.")
 
@@ -59,7 +58,7 @@ def _triple(size: float | Sequence[float]) -> tuple[float, float, float]:
     values = (size, size, size) if isinstance(size, int | float) else tuple(size)
     if len(values) != 3:
         raise TruefieldError(f"size must be one number or three, not {len(values)}: give (x, y, z).")
-    positive("size", values)
+    _positive("size", values)
     return float(values[0]), float(values[1]), float(values[2])
 
 
@@ -104,7 +103,7 @@ def cylinder(radius: float = 1.0, height: float = 2.0, segments: int = 64) -> Tr
     Volume segments / 2 x radius^2 sin(2 pi / segments) x height; greatest depth
     min(height / 2, radius cos(pi / segments)).
     """
-    positive("radius and height", (radius, height))
+    _positive("radius and height", (radius, height))
     ring = radius * unit_circle(segments)
     low = np.column_stack([ring, np.zeros(segments)])
     vertices = np.vstack([low, low + np.array((0.0, 0.0, height)), [(0.0, 0.0, 0.0), (0.0, 0.0, height)]])
@@ -127,7 +126,7 @@ def torus(ring_radius: float = 3.0, tube_radius: float = 1.0, segments: tuple[in
 
     Smooth volume 2 pi^2 ring_radius tube_radius^2; greatest depth close to tube_radius, all along the ring.
     """
-    positive("ring_radius and tube_radius", (ring_radius, tube_radius))
+    _positive("ring_radius and tube_radius", (ring_radius, tube_radius))
     if tube_radius >= ring_radius:
         raise TruefieldError(
             f"a torus of tube_radius {tube_radius} meets itself at ring_radius {ring_radius}: make the tube thinner."
@@ -151,7 +150,7 @@ def sphere(radius: float = 1.0, subdivisions: int = 4) -> TriangleMesh:
     8 x 4**subdivisions triangles (4: 2,048; 8: 524,288). Greatest depth, at the centre, is the smallest distance of a
     triangle's plane from it: radius (1 - O(4**-subdivisions)).
     """
-    positive("radius", (radius,))
+    _positive("radius", (radius,))
     if not 0 <= subdivisions <= 10:
         raise TruefieldError(
             f"subdivisions must lie in 0..10, not {subdivisions}: 10 already makes 8 million triangles."

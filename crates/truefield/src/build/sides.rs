@@ -52,8 +52,11 @@ impl<'a> Sides<'a> {
         let mut sides = [Side::Outside; BLOCK];
         let distance: [f64; BLOCK] = std::array::from_fn(|i| answers.squared[i].sqrt());
         let hand_on = self.surface.side_changes_at_surface_only();
-        // Two balls that meet leave no room for the surface between their centres.
-        let step = spacing * (1.0 + 1e-9);
+        // Two balls that overlap leave no room for the surface between their centres, however both were rounded.
+        let tree = self.surface.tree();
+        let reach = points.x[0].abs().max(points.y[0].abs()).max(points.z[0].abs())
+            + tree.extent.max.abs().max(tree.extent.min.abs()).max_element();
+        let step = spacing * (1.0 + 1e-9) + 64.0 * f64::EPSILON * reach;
         for (i, local) in slots(block) {
             if answers.triangle[i] == u32::MAX {
                 continue;
@@ -67,7 +70,7 @@ impl<'a> Sides<'a> {
                 None => {
                     let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
                     let triangle = answers.triangle[i];
-                    self.surface.side(p, &self.surface.tree().facet(triangle).nearest(p), triangle)
+                    self.surface.side(p, &tree.facet(triangle).nearest(p), triangle)
                 }
             };
         }

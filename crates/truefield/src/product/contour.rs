@@ -186,7 +186,8 @@ impl<'a> Tracer<'a> {
             // Outward of the sample another part of the surface may be nearer.
             let found = tree.nearest(moved, Candidate::within(self.distance.abs() * (1.0 + 1e-12) + self.half));
             let off = (found.distance_squared.sqrt() - self.distance.abs()).abs();
-            if found.found() && off <= 1e-9 * self.half && (moved - p).length() <= self.half * (1.0 + 1e-9) {
+            let rounding = 1e-9 * self.half + 8.0 * f64::EPSILON * moved.abs().max_element();
+            if found.found() && off <= rounding && (moved - p).length() <= self.half * (1.0 + 1e-9) {
                 (point, nearest) = (moved, found.triangle);
             }
         }

@@ -16,7 +16,6 @@ mod facing;
 mod line;
 mod occlusion;
 mod plan;
-mod sampled;
 mod scene;
 mod shade;
 mod spacing;
@@ -24,7 +23,6 @@ mod tile;
 mod visible;
 
 pub use camera::{Camera, Lens, Projection, View};
-pub use sampled::SurfaceSamples;
 pub use scene::{Balls, Finish, Ink, Paint, Ramp, Rgb, Scene, Splats, Triangles};
 pub use spacing::covering_radius;
 
