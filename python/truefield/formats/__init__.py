@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from truefield.errors import FileError
 from truefield.files import PathLike
-from truefield.formats import obj, off, ply, scene, stl
+from truefield.formats import obj, off, ply, stl
 
 if TYPE_CHECKING:
     from truefield.formats.polygons import Soup
@@ -29,6 +29,8 @@ def decode(data: bytes, path: Path) -> Soup:
     """Vertices and triangles of the file's content; `path` gives the format and, for `.gltf`, its neighbours."""
     suffix = path.suffix.lower()
     if suffix in _CONTAINERS:
+        from truefield.formats import scene  # brings archives and XML with it
+
         return scene.decode(data, path)
     return _DECODERS[suffix](data)
 
