@@ -156,19 +156,13 @@ def heavy(threads: int, repeats: int) -> Table:
         part = getattr(tf.shapes, name)()
         peak = Peak()
         seconds, report = _median(repeats, tf.thickness, part, above=above, tolerance=tolerance, threads=threads)
-        facts = report.to_json()
-        rows.append(
-            [
-                name,
-                _n(len(part.triangles)),
-                f"{above:g}",
-                f"{tolerance:g}",
-                _s(seconds),
-                str(facts),
-                f"{peak.mebibytes():.0f}",
-            ]
-        )
-    head = ["part", "triangles", "above", "tolerance", "time", "greatest depth", "sections", "peak MiB"]
+        depth, sections = report.greatest_depth.depth, report.heavy_sections
+        volume = sum(s.volume.lower for s in sections), sum(s.volume.upper for s in sections)
+        rows.append([
+            name, _n(len(part.triangles)), f"{above:g}", f"{tolerance:g}", _s(seconds), str(len(sections)),
+            f"{depth.lower:.3f} to {depth.upper:.3f}", f"{volume[0]:.0f} to {volume[1]:.0f}", f"{peak.mebibytes():.0f}",
+        ])  # fmt: skip
+    head = ["part", "triangles", "above", "tolerance", "time", "sections", "greatest depth", "their volume", "peak MiB"]
     return {"title": "heavy sections", "head": head, "rows": rows}
 
 

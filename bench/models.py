@@ -30,9 +30,4 @@ def welded(part: tf.TriangleMesh) -> tf.TriangleMesh:
     Some tools join such corners themselves and some refuse a mesh whose corners are apart, so that only joining
     them for all lets all do the same work.
     """
-    vertices, triangles = np.asarray(part.vertices), np.asarray(part.triangles)
-    step = float(np.abs(vertices).max()) * float(np.finfo(np.float32).eps)
-    _, first, which = np.unique(np.round(vertices / step), axis=0, return_index=True, return_inverse=True)
-    joined = which.reshape(-1)[triangles]
-    whole = (joined != np.roll(joined, 1, axis=1)).all(axis=1)
-    return tf.TriangleMesh(vertices[first], joined[whole], part.name)
+    return part.weld(float(np.abs(part.vertices).max()) * float(np.finfo(np.float32).eps))

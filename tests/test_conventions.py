@@ -84,6 +84,13 @@ def test_interval_spans_zero_where_the_side_is_unknown(part: tf.TriangleMesh) ->
     assert (lower[0], upper[0]) == (-2.0, 2.0)
 
 
+def test_contours_outside_are_positive(part: tf.TriangleMesh) -> None:
+    field = tf.complete_field(part, resolution=12)
+    for level in (-0.5, 0.5):
+        shell = field.contour(level, tolerance=0.1)
+        np.testing.assert_allclose(tf.Surface(part).distance(shell.points), level, rtol=0, atol=0.05)
+
+
 def test_results_are_the_same_bits_for_any_number_of_threads(part: tf.TriangleMesh) -> None:
     points = np.random.default_rng(2).uniform(LOW - 1, HIGH + 1, (5000, 3))
     for threads in (2, 7):

@@ -421,6 +421,7 @@ def test_points_from_numpy(tmp_path: Path) -> None:
         ("nan.csv", b"1,2,3\n4,nan,6\n", r"point 1 of '.*' is \(4.0, nan, 6.0\)"),
         ("inf.xyz", b"1 2 inf\n", "point 0"),
         ("binary.csv", b"\x93NUMPY\0\0\0", "zero bytes"),
+        ("header.npy", b"\x93NUMPY\x01\0\x10\0{'descr': '<f8',", "no numpy array"),
         ("cut.npy", b"\x93NUMPY\x01\0", "no numpy array"),
         ("mesh.ply", b"ply\nformat ascii 1.0\nend_header\n", "no element 'vertex'"),
     ],

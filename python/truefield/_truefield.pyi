@@ -120,6 +120,18 @@ class Scene:
         opacity: float = 1.0,
         ink: tuple[tuple[int, int, int], float, float] | None = None,
     ) -> None: ...
+    def add_sampled_mesh(
+        self,
+        vertices: _Floats,
+        triangles: NDArray[np.int64],
+        points: _Floats,
+        normals: _Floats,
+        values: _Floats,
+        colours: NDArray[np.uint8],
+        span: tuple[float, float],
+        finish: str = "chart",
+        ink: tuple[tuple[int, int, int], float, float] | None = None,
+    ) -> None: ...
     def add_points(
         self,
         points: _Floats,

@@ -50,13 +50,11 @@ def from_oklab(lab: ArrayLike) -> Array:
     return 255.0 * np.where(linear <= 0.0031308, 12.92 * linear, bright)
 
 
-@lru_cache(maxsize=8)
-def even_map(count: int = 256) -> NDArray[np.uint8]:
-    """(count, 3) uint8 colours from dark violet over teal to bright yellow, read-only.
+def even_path(count: int) -> Array:
+    """(count, 3) OKLab colours from dark violet over teal to bright yellow, all within the screen's gamut.
 
-    Lightness rises in equal steps and so does the difference between neighbours, both in OKLab: equal steps
-    of the value look equal, in print without colour too. The hue turns by as much as is left of each step
-    when lightness and chroma have had their share.
+    Lightness rises in equal steps and so does the difference between neighbours: the hue turns by as much as is
+    left of each step when lightness and chroma have had their share.
 
     Raises:
         TruefieldError: count is below 2.
@@ -80,8 +78,17 @@ def even_map(count: int = 256) -> NDArray[np.uint8]:
     hue = np.radians(_HUES[0]) - turned(high)
     at = np.linspace(*_LIGHTNESS, count)
     radius, angle = np.interp(at, fine, chroma), np.interp(at, fine, hue)
-    colours = from_oklab(np.stack([at, radius * np.cos(angle), radius * np.sin(angle)], axis=-1))
-    result = np.clip(np.rint(colours), 0, 255).astype(np.uint8)
+    return np.stack([at, radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+@lru_cache(maxsize=8)
+def even_map(count: int = 256) -> NDArray[np.uint8]:
+    """(count, 3) uint8 colours of the even path, read-only: equal steps of the value look equal, in grey print too.
+
+    Raises:
+        TruefieldError: count is below 2.
+    """
+    result = np.rint(from_oklab(even_path(count))).astype(np.uint8)
     result.flags.writeable = False
     return result
 
@@ -99,7 +106,7 @@ def distinct(count: int) -> list[Colour]:
     result: list[Colour] = []
     for index in range(count):
         hue = np.radians(45.0 + 137.508 * index)
-        lightness = 0.66 if index % 2 == 0 else 0.58
+        lightness = (0.66, 0.56, 0.75)[index % 3]
         chroma = 0.17
         # Less chroma where the screen cannot show it.
         while True:

@@ -55,7 +55,10 @@ def tick_labels(places: list[float]) -> list[str]:
     step = places[1] - places[0]
     decimals = max(0, -math.floor(math.log10(step) + 1e-9))
     if decimals > 4 or max(abs(place) for place in places) >= 1e6:
-        return [number(place, 4) for place in places]
+        largest = max(abs(place) for place in places)
+        return [
+            number(place, math.floor(math.log10(largest)) - math.floor(math.log10(step) + 1e-9) + 1) for place in places
+        ]
     return [f"{place:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for place in places]
 
 

@@ -40,6 +40,8 @@ Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 View = str | Vector | tuple[Vector, Vector]
 Ball = tuple[ArrayLike, float]
+Progress = Callable[[str, float], None]
+_How = tuple[int | None, Progress | None]
 
 WHITE: Final[Colour] = (255, 255, 255)
 _GLASS: Final[Colour] = (138, 172, 205)
@@ -62,6 +64,7 @@ def contour_picture(
     colour: Colour = _WARM,
     background: Colour | None = WHITE,
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Image.Image:
     """The part as glass and a contour inside it as shaded discs, one per point.
 
@@ -75,6 +78,7 @@ def contour_picture(
         colour: of the contour.
         background: a colour, or None for a transparent picture.
         threads: worker threads.
+        progress: told the phase and the fraction done.
 
     Raises:
         TruefieldError: an input cannot be drawn; the sentence says why.
@@ -83,7 +87,7 @@ def contour_picture(
     scene = Scene()
     _add_part(scene, mesh, size, opacity=_CLEARNESS)
     _add_points(scene, cloud, radius, colour)
-    image = _render(scene, _camera(mesh, view), size, background, threads)
+    image = _render(scene, _camera(mesh, view), size, background, (threads, progress))
     return _finished(image, path)
 
 
@@ -96,6 +100,7 @@ def part_picture(
     colour: Colour = _METAL,
     background: Colour | None = WHITE,
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Image.Image:
     """The part, opaque, with its sharp edges drawn.
 
@@ -105,7 +110,7 @@ def part_picture(
     _check_size(size)
     scene = Scene()
     _add_part(scene, mesh, size, colour=colour)
-    return _finished(_render(scene, _camera(mesh, view), size, background, threads), path)
+    return _finished(_render(scene, _camera(mesh, view), size, background, (threads, progress)), path)
 
 
 def thickness_picture(
@@ -113,6 +118,7 @@ def thickness_picture(
     values: ArrayLike,
     path: PathLike | None = None,
     *,
+    at: PointCloud | None = None,
     above: float | None = None,
     below: float | None = None,
     ball: Ball | None = None,
@@ -121,13 +127,17 @@ def thickness_picture(
     view: View = "isometric",
     size: tuple[int, int] = (1600, 1200),
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Image.Image:
     """The part coloured by thickness, a colour bar with the limits, and the part as glass with its thickest place.
 
     Args:
         mesh: the part.
-        values: thickness per vertex (n,), per triangle (m,) or per corner (m, 3), in model units; NaN is drawn grey.
+        values: thickness per vertex (n,), per triangle (m,) or per corner (m, 3), in model units, or, with `at`, one
+            for each of its points. NaN is drawn grey.
         path: PNG to write, or None.
+        at: points of the surface where the values are known, with triangles or normals; each pixel takes the mean of
+            those around it that face its way.
         above: limit marked on the bar.
         below: limit marked on the bar.
         ball: centre (3,) and radius of the largest inscribed ball; None leaves the second panel out.
@@ -136,14 +146,15 @@ def thickness_picture(
         view: from where; see the module.
         size: width and height in pixels.
         threads: worker threads.
+        progress: told the phase and the fraction done.
 
     Raises:
         TruefieldError: an input cannot be drawn; the sentence says why.
     """
     _check_size(size)
-    data, per = _values(mesh, values)
+    data, per = _values(mesh, values) if at is None else (_values_at(at, values), "point")
     span = _span(data, span)
-    camera = _camera(mesh, view, margin=0.03)
+    camera = _camera(mesh, view, margin=0.0)
     unit = min(size[0] / 1600, size[1] / 1200)
     text = 26.0 * unit
     page = Image.new("RGB", size, WHITE)
@@ -153,39 +164,36 @@ def thickness_picture(
     write(draw, (edge, edge + 2.0 * text), "model units", text, colour=FAINT, anchor="la")
 
     limits = [(name, value) for name, value in (("above", above), ("below", below)) if value is not None]
-    names = max([width_of(f"{name} {number(value)}", text) for name, value in limits], default=0.0)
-    labels = max(width_of(label, text) for label in tick_labels(ticks(*span)))
+    names = max([width_of(f"{name} {number(value)}", text) + 1.2 * text for name, value in limits], default=0.0)
+    labels = max(width_of(label, text) for label in tick_labels(ticks(*span))) + 0.8 * text
     bar = round(34 * unit)
-    column = round(names + labels + bar + 3.4 * text) + edge
-    top = edge + round(3.6 * text)
-    panels = _panels((edge, top, size[0] - column, size[1] - edge), 1 if ball is None else 2, _aspect(camera))
-    right = size[0] - edge - round(labels + 0.7 * text)
-    colour_bar(page, (right - bar, top, right, min(size[1] - edge, top + round(760 * unit))), span, text, limits)
+    column = round(names + labels + bar + 1.5 * text)
+    top = edge + round(3.9 * text)
+    caption = 0 if ball is None else round(2.2 * text)
+    room = (edge, top, size[0] - edge - column, size[1] - edge - caption)
+    panels = _panels(room, 1 if ball is None else 2, _aspect(camera), round(1.2 * text))
+    left = max(panel[2] for panel in panels) + round(names + 1.5 * text)
+    colour_bar(page, (left, panels[0][1], left + bar, panels[0][3]), span, text, limits)
 
     scene = Scene()
-    box = panels[0]
-    scene.add_mesh(
-        mesh.vertices,
-        mesh.triangles,
-        np.ascontiguousarray(even_map()),
-        per=per,
-        values=data.ravel(),
-        span=span,
-        finish="chart",
-        ink=(_LINES, 0.6, _pen(size)),
-    )
-    _place(page, scene, camera, box, threads)
+    ramp, ink = np.ascontiguousarray(even_map()), (_LINES, 0.6, _pen(size))
+    if at is None:
+        scene.add_mesh(mesh.vertices, mesh.triangles, ramp, per, data.ravel(), span, finish="chart", ink=ink)
+    else:
+        normals = _normals_at(mesh, at)
+        scene.add_sampled_mesh(mesh.vertices, mesh.triangles, at.points, normals, data, ramp, span, ink=ink)
+    _place(page, scene, camera, panels[0], (threads, progress))
     if ball is not None:
         center, radius = _ball(ball)
         box = panels[1]
-        caption = round(1.8 * text)
         glass = Scene()
         _add_part(glass, mesh, size, opacity=_CLEARNESS)
-        colour = np.ascontiguousarray(colours_of([2.0 * radius], *span))
-        glass.add_balls(center[None, :], np.array([radius]), colour)
-        _place(page, glass, camera, (box[0], box[1], box[2], box[3] - caption), threads)
+        glass.add_balls(center[None, :], np.array([radius]), np.array([_WARM], dtype=np.uint8))
+        _place(page, glass, camera, box, (threads, progress))
         words = f"Thickest place: a ball of diameter {number(2.0 * radius)} fits in"
-        write(draw, (0.5 * (box[0] + box[2]), box[3] - 0.4 * text), words, text, anchor="ms")
+        half = 0.5 * width_of(words, text)
+        middle = min(max(0.5 * (box[0] + box[2]), edge + half), size[0] - edge - half)
+        write(draw, (middle, box[3] + 1.6 * text), words, text, anchor="ms")
     return _finished(page, path)
 
 
@@ -199,6 +207,7 @@ def heavy_sections_picture(
     view: View = "isometric",
     size: tuple[int, int] = (1600, 1200),
     threads: int | None = None,
+    progress: Progress | None = None,
 ) -> Image.Image:
     """The part as glass with the deepest ball of each heavy section, numbered and listed.
 
@@ -211,6 +220,7 @@ def heavy_sections_picture(
         view: from where; see the module.
         size: width and height in pixels.
         threads: worker threads.
+        progress: told the phase and the fraction done.
 
     Raises:
         TruefieldError: an input cannot be drawn; the sentence says why.
@@ -240,7 +250,7 @@ def heavy_sections_picture(
     rows = [f"ball of diameter {number(2.0 * radius)}" for _, radius in pairs[:shown]]
     column = round(max([width_of(row, text) for row in rows], default=0.0) + 2.4 * text) + edge if rows else edge
     box = (edge, top, size[0] - column - edge // 2, size[1] - edge)
-    _place(page, scene, camera, box, threads)
+    _place(page, scene, camera, box, (threads, progress))
     left = size[0] - column
     for index, row in enumerate(rows):
         y = top + 1.5 * text * (index + 0.5)
@@ -435,17 +445,24 @@ def _add_points(scene: Scene, cloud: PointCloud, radius: float | None, colour: C
     scene.add_points(cloud.points, normals, np.array([colour], dtype=np.uint8), radius=radius)
 
 
-def _render(
-    scene: Scene, camera: Camera, size: tuple[int, int], background: Colour | None, threads: int | None
-) -> Image.Image:
-    pixels, _ = scene.render(camera, size[0], size[1], background=background, occlusion=_OCCLUSION, threads=threads)
+def _render(scene: Scene, camera: Camera, size: tuple[int, int], background: Colour | None, how: _How) -> Image.Image:
+    threads, progress = how
+    pixels, _ = scene.render(
+        camera,
+        size[0],
+        size[1],
+        background=background,
+        occlusion=_OCCLUSION,
+        threads=threads,
+        progress=progress,
+    )
     image = Image.fromarray(pixels)
     return image if background is None else image.convert("RGB")
 
 
-def _place(page: Image.Image, scene: Scene, camera: Camera, box: Box, threads: int | None) -> None:
+def _place(page: Image.Image, scene: Scene, camera: Camera, box: Box, how: _How) -> None:
     size = (max(box[2] - box[0], 1), max(box[3] - box[1], 1))
-    page.paste(_render(scene, camera, size, WHITE, threads), (box[0], box[1]))
+    page.paste(_render(scene, camera, size, WHITE, how), (box[0], box[1]))
 
 
 def _aspect(camera: Camera) -> float:
@@ -454,19 +471,29 @@ def _aspect(camera: Camera) -> float:
     return wide / high
 
 
-def _panels(box: Box, count: int, aspect: float) -> list[Box]:
-    """One or two boxes, side by side or one above the other: whichever shows the part larger."""
+def _panels(box: Box, count: int, aspect: float, gap: int) -> list[Box]:
+    """One box, or a large and a smaller one, side by side or one above the other: whichever shows the part larger.
+
+    The boxes have the aspect of what they hold, and the group of them is in the middle of `box`.
+    """
     left, top, right, bottom = box
-    if count == 1:
-        return [box]
-    wide, high = right - left, bottom - top
-    beside = min(0.5 * wide / aspect, high)
-    stacked = min(wide / aspect, 0.5 * high)
+    wide, high = max(right - left, 1), max(bottom - top, 1)
+    shares = [1.0] if count == 1 else [0.58, 0.42]
+    gap = gap if count == 2 else 0
+    beside = min(wide - gap, high * aspect * sum(shares) / shares[0])
+    stacked = min(wide * sum(shares) / shares[0], (high - gap) * aspect)
+    scale = max(beside, stacked, 1.0)
+    sizes = [(max(round(share * scale), 1), max(round(share * scale / aspect), 1)) for share in shares]
     if beside >= stacked:
-        middle = (left + right) // 2
-        return [(left, top, middle, bottom), (middle, top, right, bottom)]
-    middle = (top + bottom) // 2
-    return [(left, top, right, middle), (left, middle, right, bottom)]
+        x = left + (wide - gap - sum(w for w, _ in sizes)) // 2
+        y = top + (high - sizes[0][1]) // 2
+        places = [x] if count == 1 else [x, x + sizes[0][0] + gap]
+        # On one base line.
+        return [(px, y + sizes[0][1] - h, px + w, y + sizes[0][1]) for px, (w, h) in zip(places, sizes, strict=True)]
+    y = top + (high - gap - sum(h for _, h in sizes)) // 2
+    middle = left + wide // 2
+    places = [y] if count == 1 else [y, y + sizes[0][1] + gap]
+    return [(middle - w // 2, py, middle - w // 2 + w, py + h) for py, (w, h) in zip(places, sizes, strict=True)]
 
 
 def _badge(page: Image.Image, at: tuple[float, float], label: str, text: float, colour: Colour) -> None:
@@ -498,6 +525,24 @@ def _values(mesh: TriangleMesh, values: ArrayLike) -> tuple[Array, str]:
         f"the values have shape {data.shape}; give one per vertex ({vertices},), per triangle ({triangles},) "
         f"or per corner ({triangles}, 3)"
     )
+
+
+def _values_at(cloud: PointCloud, values: ArrayLike) -> Array:
+    data = np.ascontiguousarray(values, dtype=np.float64)
+    if data.shape != (len(cloud),):
+        raise TruefieldError(f"the values have shape {data.shape}; give one for each of the {len(cloud)} points")
+    return data
+
+
+def _normals_at(mesh: TriangleMesh, cloud: PointCloud) -> Array:
+    if cloud.triangle is None:
+        if cloud.normals is None:
+            raise TruefieldError("the points have neither triangles nor normals; give them one of the two")
+        return cloud.normals
+    if len(cloud) and not 0 <= cloud.triangle.min() <= cloud.triangle.max() < len(mesh.triangles):
+        raise TruefieldError(f"a point names a triangle that the mesh has not (0 to {len(mesh.triangles) - 1})")
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles[cloud.triangle]], 1, 0)
+    return np.cross(b - a, c - a)
 
 
 def _span(data: Array, span: tuple[float, float] | None) -> tuple[float, float]:

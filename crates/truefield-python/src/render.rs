@@ -3,7 +3,8 @@
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use truefield::product::render::{
-    Background, Camera, Canvas, Finish, Ink, Paint, Picture, Projection, Ramp, Rgb, Samples, Scene, View, covering_radius, render,
+    Background, Camera, Canvas, Finish, Ink, Paint, Picture, Projection, Ramp, Rgb, Samples, Scene, SurfaceSamples, View, covering_radius,
+    render,
 };
 use truefield::{Aabb, Error, Result};
 
@@ -51,6 +52,12 @@ fn finish(name: &str) -> Result<Finish> {
         "polished" => Ok(Finish::POLISHED),
         _ => Err(Error::invalid(format!("there is no finish called {name:?}; use satin, chart or polished"))),
     }
+}
+
+type Pen = Option<((u8, u8, u8), f64, f64)>;
+
+fn ink(pen: Pen) -> Option<Ink> {
+    pen.map(|((r, g, b), opacity, width)| Ink { colour: [r, g, b], opacity, width })
 }
 
 /// Where the viewer stands.
@@ -141,12 +148,35 @@ impl PyScene {
         span: Span,
         finish: &str,
         opacity: f64,
-        ink: Option<((u8, u8, u8), f64, f64)>,
+        ink: Pen,
     ) -> PyResult<()> {
         let mesh = mesh(&vertices, &triangles)?;
-        let add = || {
-            let ink = ink.map(|((r, g, b), opacity, width)| Ink { colour: [r, g, b], opacity, width });
-            self.0.add_mesh(&mesh, paint(per, &colours, values, span)?, self::finish(finish)?, opacity, ink)
+        let add = || self.0.add_mesh(&mesh, paint(per, &colours, values, span)?, self::finish(finish)?, opacity, self::ink(ink));
+        add().map_err(raise)
+    }
+
+    /// Adds a mesh whose colours come from values at points of it.
+    #[pyo3(signature = (vertices, triangles, points, normals, values, colours, span, finish = "chart", ink = None))]
+    #[allow(clippy::too_many_arguments)]
+    fn add_sampled_mesh(
+        &mut self,
+        vertices: PyReadonlyArray2<'_, f64>,
+        triangles: PyReadonlyArray2<'_, i64>,
+        points: PyReadonlyArray2<'_, f64>,
+        normals: PyReadonlyArray2<'_, f64>,
+        values: PyReadonlyArray1<'_, f64>,
+        colours: PyReadonlyArray2<'_, u8>,
+        span: (f64, f64),
+        finish: &str,
+        ink: Pen,
+    ) -> PyResult<()> {
+        let mesh = mesh(&vertices, &triangles)?;
+        let (points, normals) = (vectors(&points)?, vectors(&normals)?);
+        let values: Vec<f64> = values.as_array().iter().copied().collect();
+        let mut add = || {
+            let ramp = Ramp { colours: self::colours(&colours)?, low: span.0, high: span.1 };
+            let paint = Paint::Sampled(SurfaceSamples::new(&points, &normals, &values)?, ramp);
+            self.0.add_mesh(&mesh, paint, self::finish(finish)?, 1.0, self::ink(ink))
         };
         add().map_err(raise)
     }

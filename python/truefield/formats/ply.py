@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from io import BytesIO
+from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ _NAMES: Final = {
     "f8": "double",
 }
 _ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">"}
+_ROWS: Final = 65_536
 _CORNERS: Final = ("vertex_indices", "vertex_index")
 
 
@@ -263,18 +265,32 @@ def encode(mesh: TriangleMesh) -> bytes:
 
 
 def encode_points(columns: Mapping[str, NDArray[np.generic]], further: str = "") -> bytes:
-    """Binary little endian PLY whose element `vertex` has these columns, in order; `further` ends the header.
+    """What `write_points` writes; `further` ends the header."""
+    stream = BytesIO()
+    _write(stream, columns, further)
+    return stream.getvalue()
+
+
+def write_points(stream: IO[bytes], columns: Mapping[str, NDArray[np.generic]]) -> None:
+    """Binary little endian PLY whose element `vertex` has these columns, in order, written piece by piece.
 
     Whole numbers are stored as `int` or `uint` at most, since few readers know wider ones.
     """
+    _write(stream, columns, "")
+
+
+def _write(stream: IO[bytes], columns: Mapping[str, NDArray[np.generic]], further: str) -> None:
     kinds = {name: _kind(name, column) for name, column in columns.items()}
     count = len(next(iter(columns.values())))
-    table = np.empty(count, dtype=[(name, "<" + kind) for name, kind in kinds.items()])
-    for name, column in columns.items():
-        table[name] = column
     properties = "".join(f"property {_NAMES[kind]} {name}\n" for name, kind in kinds.items())
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {count}\n{properties}{further}end_header\n"
-    return header.encode("ascii") + table.tobytes()
+    stream.write(header.encode("ascii"))
+    row = np.dtype([(name, "<" + kind) for name, kind in kinds.items()])
+    for first in range(0, count, _ROWS):
+        rows = np.empty(min(_ROWS, count - first), dtype=row)
+        for name, column in columns.items():
+            rows[name] = column[first : first + _ROWS]
+        stream.write(rows.tobytes())
 
 
 def _kind(name: str, column: NDArray[np.generic]) -> str:

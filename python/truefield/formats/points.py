@@ -9,7 +9,7 @@ from typing import IO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from truefield.formats.polygons import FormatError, numbers
+from truefield.formats.polygons import FormatError, numbers, reason
 
 _ROWS: Final = 65_536
 
@@ -47,8 +47,8 @@ def decode_npy(data: bytes) -> NDArray[np.float64]:
     """A numpy array file of shape (n, 3)."""
     try:
         array = np.load(BytesIO(data), allow_pickle=False)
-    except (ValueError, EOFError, OSError) as error:
-        raise FormatError(f"it is damaged or no numpy array file ({error})") from None
+    except Exception as error:  # numpy lets out whatever its header parser stumbles over
+        raise FormatError(f"it is damaged or no numpy array file ({reason(error)})") from None
     if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iuf":
         shape = getattr(array, "shape", None)
         raise FormatError(

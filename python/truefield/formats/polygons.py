@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import shorten
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,11 @@ def merge_equal(soup: Soup) -> Soup:
     leader = leaders(soup.vertices, 0.0)
     kept = np.flatnonzero(leader == np.arange(len(leader)))
     return Soup(soup.vertices[kept] + 0.0, np.searchsorted(kept, leader)[soup.triangles])
+
+
+def reason(error: Exception) -> str:
+    """Another library's error on one short line."""
+    return shorten(f"{type(error).__name__}: {error}", 120, placeholder=" ...")
 
 
 def numbers(tokens: Sequence[bytes], what: str) -> NDArray[np.float64]:

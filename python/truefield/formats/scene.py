@@ -11,13 +11,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from textwrap import shorten
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
 import numpy as np
 
-from truefield.formats.polygons import FormatError, Soup, merge_equal
+from truefield.formats.polygons import FormatError, Soup, merge_equal, reason
 
 if TYPE_CHECKING:
     from trimesh import Scene
@@ -54,14 +53,10 @@ def _load(data: bytes, kind: str, path: Path) -> Scene:
                 BytesIO(data), file_type=kind, resolver=resolver, allow_remote=False, process=False
             )
     except Exception as error:
-        raise FormatError(f"it is damaged or no {kind.upper()} ({_reason(error)})") from None
+        raise FormatError(f"it is damaged or no {kind.upper()} ({reason(error)})") from None
     if any("not defined" in complaint for complaint in complaints):
         raise FormatError("it places an object that it does not hold; export it again")
     return scene
-
-
-def _reason(error: Exception) -> str:
-    return shorten(f"{type(error).__name__}: {error}", 120, placeholder=" ...")
 
 
 @contextmanager
@@ -116,7 +111,7 @@ def _triangles_of_gltf(data: bytes, kind: str) -> int:
             ]["count"]
             total += corners // 3 if mode == _TRIANGLES else max(0, corners - 2) if mode > _TRIANGLES else 0
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, struct.error) as error:
-        raise FormatError(f"it is truncated or no {kind.upper()} ({_reason(error)})") from None
+        raise FormatError(f"it is truncated or no {kind.upper()} ({reason(error)})") from None
     return total
 
 
@@ -142,7 +137,7 @@ def _triangles_of_3mf(data: bytes) -> int:
     except FormatError:
         raise
     except Exception as error:  # zipfile lets out whatever a damaged archive leads it to
-        raise FormatError(f"it is truncated or no 3MF ({_reason(error)})") from None
+        raise FormatError(f"it is truncated or no 3MF ({reason(error)})") from None
 
 
 def _count(model: bytes) -> int:

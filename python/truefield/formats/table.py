@@ -35,7 +35,7 @@ def write(path: PathLike, columns: Mapping[str, NDArray[np.generic]]) -> None:
     with replacing(path) as stream:
         if suffix == ".ply":
             try:
-                stream.write(ply.encode_points(columns))
+                ply.write_points(stream, columns)
             except FormatError as error:
                 raise TruefieldError(f"cannot write '{path}': {error}; write .csv") from None
         elif suffix == ".csv":

@@ -49,7 +49,8 @@ def unit_circle(segments: int) -> Points:
     return np.round(corners * 2.0**40) / 2.0**40
 
 
-def _positive(name: str, values: Sequence[float]) -> None:
+def positive(name: str, values: Sequence[float]) -> None:
+    """Refuses lengths that are not above zero and finite."""
     if not all(math.isfinite(value) and value > 0.0 for value in values):
         raise TruefieldError(f"{name} must be positive and finite, not {tuple(values)}: give lengths above zero.")
 
@@ -58,7 +59,7 @@ def _triple(size: float | Sequence[float]) -> tuple[float, float, float]:
     values = (size, size, size) if isinstance(size, int | float) else tuple(size)
     if len(values) != 3:
         raise TruefieldError(f"size must be one number or three, not {len(values)}: give (x, y, z).")
-    _positive("size", values)
+    positive("size", values)
     return float(values[0]), float(values[1]), float(values[2])
 
 
@@ -103,7 +104,7 @@ def cylinder(radius: float = 1.0, height: float = 2.0, segments: int = 64) -> Tr
     Volume segments / 2 x radius^2 sin(2 pi / segments) x height; greatest depth
     min(height / 2, radius cos(pi / segments)).
     """
-    _positive("radius and height", (radius, height))
+    positive("radius and height", (radius, height))
     ring = radius * unit_circle(segments)
     low = np.column_stack([ring, np.zeros(segments)])
     vertices = np.vstack([low, low + np.array((0.0, 0.0, height)), [(0.0, 0.0, 0.0), (0.0, 0.0, height)]])
@@ -126,7 +127,7 @@ def torus(ring_radius: float = 3.0, tube_radius: float = 1.0, segments: tuple[in
 
     Smooth volume 2 pi^2 ring_radius tube_radius^2; greatest depth close to tube_radius, all along the ring.
     """
-    _positive("ring_radius and tube_radius", (ring_radius, tube_radius))
+    positive("ring_radius and tube_radius", (ring_radius, tube_radius))
     if tube_radius >= ring_radius:
         raise TruefieldError(
             f"a torus of tube_radius {tube_radius} meets itself at ring_radius {ring_radius}: make the tube thinner."
@@ -150,7 +151,7 @@ def sphere(radius: float = 1.0, subdivisions: int = 4) -> TriangleMesh:
     8 x 4**subdivisions triangles (4: 2,048; 8: 524,288). Greatest depth, at the centre, is the smallest distance of a
     triangle's plane from it: radius (1 - O(4**-subdivisions)).
     """
-    _positive("radius", (radius,))
+    positive("radius", (radius,))
     if not 0 <= subdivisions <= 10:
         raise TruefieldError(
             f"subdivisions must lie in 0..10, not {subdivisions}: 10 already makes 8 million triangles."

@@ -31,7 +31,7 @@ def housing() -> TriangleMesh:
     Walls of 5 with draft and fillets, a flange of 8 with ten bolt bosses, a through and a blind bearing seat, gussets,
     a cover opening with screw bosses. Four places are heavier than 10, as a hurried designer leaves them: the solid
     mounting pad on the +y side where it meets a gusset (thickness 17), the solid lifting boss on the roof (11), and
-    the feet of the two ribs under the bearing seats (10.4).
+    the feet of the two ribs under the bearing seats (10.8).
     """
     return finished(less(union(_skin()), [_room(), *_machining()]), "housing", smallest=0.02)
 
@@ -55,11 +55,11 @@ def _skin() -> list[Any]:
 
 
 def _gusset(x: float, side: float) -> Any:
-    """A triangular rib from the flange up the long side of the body, 5 thick at its foot and 4 at its edge."""
+    """A rib from the flange up the long side of the body, 4.2 thick at its foot and a fifth less at its edge."""
     return hull(
         [
             (x + dx * taper, side * y, z)
-            for dx in (-2.5, 2.5)
+            for dx in (-2.1, 2.1)
             for taper, y, z in ((1.0, 30.0, 6.0), (0.8, 48.0, 6.0), (0.8, 33.5, 58.0), (1.0, 30.0, 58.0))
         ]
     )
@@ -68,7 +68,7 @@ def _gusset(x: float, side: float) -> Any:
 def _strut(side: float) -> Any:
     """The rib that carries a bearing seat on the flange."""
     return hull(
-        [(side * x, y, z) for x, z in ((50.0, 5.0), (74.0, 5.0), (74.0, 24.0), (50.0, 24.0)) for y in (-3.0, 3.0)]
+        [(side * x, y, z) for x, z in ((50.0, 5.0), (74.0, 5.0), (74.0, 24.0), (50.0, 24.0)) for y in (-3.6, 3.6)]
     )
 
 

@@ -38,7 +38,8 @@ def solid_of_rings(rings: npt.ArrayLike) -> Any:
 
     Rings run counter-clockwise seen against the direction in which they follow each other.
     """
-    points = np.asarray(rings, dtype=np.float64)
+    # Coarser than any rounding in sines and products, so that every machine starts from the same numbers.
+    points = np.round(np.asarray(rings, dtype=np.float64) * 2.0**32) / 2.0**32
     count, n, _ = points.shape
     low, high = points[0].mean(axis=0), points[-1].mean(axis=0)
     vertices = np.vstack([points.reshape(-1, 3), low, high])
@@ -163,17 +164,23 @@ def duct(centres: npt.ArrayLike, radii: npt.ArrayLike, segments: int = 32) -> An
     return solid_of_rings(rings)
 
 
-def finished(solid: Any, name: str, smallest: float, longest: float | None = None) -> TriangleMesh:
-    """The mesh of a solid without features below `smallest`, edges split to `longest` where that is given.
+def finished(solid: Any, name: str, smallest: float) -> TriangleMesh:
+    """The mesh of a solid, flawless by `TriangleMesh.check`, without features below `smallest` or a fraction of it.
 
-    Vertices lie on a lattice of 2**-14 units (2**-18 below 16 units), which float32 holds exactly: an STL file gives
-    the same mesh back, and last-bit differences between machines vanish.
+    Vertices lie on the lattice of the floats of single precision near the largest coordinate: an STL file gives the
+    same mesh back, and last-bit differences between machines vanish.
     """
-    solid = _checked(solid.as_original().simplify(smallest))
-    if longest is not None:
-        solid = solid.refine_to_length(longest)
+    whole = solid.as_original()
+    for attempt in range(8):
+        # Leaving out small features can fold a nearby sliver over its neighbour; leaving out less then helps.
+        mesh = _on_lattice(_checked(whole.simplify(smallest / 2.0**attempt)), name)
+        if not mesh.check().problems():
+            return mesh
+    raise RuntimeError(f"no mesh of {name} without flaws was found: {'; '.join(mesh.check().problems())}")
+
+
+def _on_lattice(solid: Any, name: str) -> TriangleMesh:
     mesh = solid.to_mesh64()
     vertices = np.array(mesh.vert_properties[:, :3], dtype=np.float64)
-    triangles = np.array(mesh.tri_verts, dtype=np.int64)
-    grid = 2.0**18 if np.abs(vertices).max() < 16.0 else 2.0**14
-    return TriangleMesh(np.round(vertices * grid) / grid, triangles, name=name)
+    step = float(np.spacing(np.float32(np.abs(vertices).max())))
+    return TriangleMesh(np.round(vertices / step) * step, np.array(mesh.tri_verts, dtype=np.int64), name=name)

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from truefield.mesh import TriangleMesh
-from truefield.shapes.analytic import Points, box
+from truefield.shapes.analytic import Points, box, positive
 
 # Notch depth at which a tooth's prongs hold a ball of radius 0.48; see `one_ended_tooth`.
 _NOTCH = 1.425
@@ -29,6 +29,7 @@ def tetrahedron(size: float = 1.0) -> TriangleMesh:
 
     Greatest depth size / (3 + sqrt(3)) = 0.2113 (paper: 0.2); volume size^3 / 6.
     """
+    positive("size", (size,))
     vertices = size * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=np.float64)
     return TriangleMesh(vertices, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]), name="tetrahedron")
 

@@ -1,12 +1,15 @@
 //! What of a mesh is smooth and what is sharp: a normal per corner, and the lines along creases.
 
-use crate::geom::DVec3;
+use crate::geom::{Aabb, DVec3};
+
+/// The least length of connected lines that are drawn, as a share of the diagonal of all of them.
+const SHORTEST_LINE: f64 = 0.03;
 
 /// Normals and creases of a mesh; vertices at the same place count as one, so a soup of triangles reads like a solid.
 pub(super) struct Shape {
     /// Unit normal of each corner of each triangle, smoothed over neighbours that are not across a crease.
     pub normals: Vec<[[f32; 3]; 3]>,
-    /// Vertex pairs of the sharp, open and non-manifold edges.
+    /// Vertex pairs of the sharp, open and non-manifold edges that make lines of some length.
     pub creases: Vec<[u32; 2]>,
 }
 
@@ -15,7 +18,7 @@ impl Shape {
         let smooth = crease_degrees.to_radians().cos();
         let place = places(vertices);
         let faces: Vec<DVec3> = triangles.iter().map(|t| face_normal(t.map(|v| vertices[v as usize]))).collect();
-        let creases = creases(&place, triangles, &faces, smooth);
+        let creases = long_lines(vertices, creases(&place, triangles, &faces, smooth));
         Self { normals: corner_normals(vertices, &place, triangles, &faces, smooth), creases }
     }
 }
@@ -75,6 +78,28 @@ fn creases(place: &[u32], triangles: &[[u32; 3]], faces: &[DVec3], smooth: f64) 
         .collect()
 }
 
+/// Without the lines that are shorter than a share of the whole: a scan is full of single sharp edges that mean nothing.
+fn long_lines(vertices: &[DVec3], creases: Vec<[u32; 2]>) -> Vec<[u32; 2]> {
+    let mut parent: Vec<u32> = (0..vertices.len() as u32).collect();
+    fn root(parent: &mut [u32], mut v: u32) -> u32 {
+        while parent[v as usize] != v {
+            parent[v as usize] = parent[parent[v as usize] as usize];
+            v = parent[v as usize];
+        }
+        v
+    }
+    for &[a, b] in &creases {
+        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+        parent[a.max(b) as usize] = a.min(b);
+    }
+    let mut length = vec![0.0; vertices.len()];
+    for &[a, b] in &creases {
+        length[root(&mut parent, a) as usize] += vertices[a as usize].distance(vertices[b as usize]);
+    }
+    let shortest = SHORTEST_LINE * Aabb::around(creases.iter().flatten().map(|&v| vertices[v as usize])).diagonal();
+    creases.into_iter().filter(|[a, _]| length[root(&mut parent, *a) as usize] >= shortest).collect()
+}
+
 fn corner_normals(vertices: &[DVec3], place: &[u32], triangles: &[[u32; 3]], faces: &[DVec3], smooth: f64) -> Vec<[[f32; 3]; 3]> {
     // Which corners meet at each place.
     let mut start = vec![0_usize; vertices.len() + 1];
@@ -111,4 +136,74 @@ fn corner_normals(vertices: &[DVec3], place: &[u32], triangles: &[[u32; 3]], fac
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner(i: usize) -> DVec3 {
+        DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64)
+    }
+
+    /// A cube whose triangles share no vertices, as in an STL file.
+    fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let vertices = quads.iter().flat_map(|q| [q[0], q[1], q[2], q[0], q[2], q[3]]).map(corner).collect();
+        (vertices, (0..12).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect())
+    }
+
+    #[test]
+    fn a_soup_that_looks_like_a_cube_has_twelve_creases_and_flat_sides() {
+        let (vertices, triangles) = cube();
+        let shape = Shape::of(&vertices, &triangles, 32.0);
+        assert_eq!(shape.creases.len(), 12);
+        for (t, normals) in triangles.iter().zip(&shape.normals) {
+            let flat = face_normal(t.map(|v| vertices[v as usize]));
+            assert!(normals.iter().all(|n| DVec3::from(n.map(f64::from)).dot(flat) > 0.999_999));
+        }
+    }
+
+    #[test]
+    fn a_flipped_triangle_makes_no_crease_and_a_missing_one_three() {
+        let (vertices, mut triangles) = cube();
+        triangles[3].swap(0, 1);
+        assert_eq!(Shape::of(&vertices, &triangles, 32.0).creases.len(), 12);
+        triangles.remove(3);
+        // Two of its sides are edges of the cube already; its diagonal is open now.
+        assert_eq!(Shape::of(&vertices, &triangles, 32.0).creases.len(), 13);
+    }
+
+    #[test]
+    fn a_drum_is_smooth_around_and_sharp_at_its_rims() {
+        let count = 48_u32;
+        let ring = |z: f64| {
+            (0..count).map(move |k| {
+                let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / f64::from(count)).sin_cos();
+                DVec3::new(cos, sin, z)
+            })
+        };
+        let vertices: Vec<DVec3> = ring(0.0).chain(ring(2.0)).chain([DVec3::ZERO, DVec3::Z * 2.0]).collect();
+        let triangles: Vec<[u32; 3]> = (0..count)
+            .flat_map(|k| {
+                let (a, b) = (k, (k + 1) % count);
+                [[a, b, b + count], [a, b + count, a + count], [b, a, 2 * count], [a + count, b + count, 2 * count + 1]]
+            })
+            .collect();
+        let shape = Shape::of(&vertices, &triangles, 32.0);
+        assert_eq!(shape.creases.len(), 2 * count as usize);
+        for (t, normals) in triangles.iter().zip(&shape.normals).filter(|(t, _)| t[2] < 2 * count) {
+            for (&v, normal) in t.iter().zip(normals) {
+                let radial = vertices[v as usize] * DVec3::new(1.0, 1.0, 0.0);
+                assert!(DVec3::from(normal.map(f64::from)).dot(radial) > 0.999, "vertex {v}: {normal:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn single_sharp_edges_of_a_scan_are_no_lines() {
+        let vertices = vec![DVec3::ZERO, DVec3::X * 10.0, DVec3::Y * 10.0, DVec3::splat(5.0), DVec3::splat(5.1)];
+        assert_eq!(long_lines(&vertices, vec![[0, 1], [1, 2], [3, 4]]), [[0, 1], [1, 2]]);
+        assert!(long_lines(&vertices, Vec::new()).is_empty());
+    }
 }

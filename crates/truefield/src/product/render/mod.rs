@@ -16,6 +16,7 @@ mod facing;
 mod line;
 mod occlusion;
 mod plan;
+mod sampled;
 mod scene;
 mod shade;
 mod spacing;
@@ -23,6 +24,7 @@ mod tile;
 mod visible;
 
 pub use camera::{Camera, Lens, Projection, View};
+pub use sampled::SurfaceSamples;
 pub use scene::{Balls, Finish, Ink, Paint, Ramp, Rgb, Scene, Splats, Triangles};
 pub use spacing::covering_radius;
 

@@ -117,7 +117,7 @@ impl Openness {
             let falloff = (1.0 - squared / (radius * radius)).max(0.0);
             sum += falloff * falloff * falloff * (v.dot(normal) - bias).max(0.0) / (squared.sqrt() + 0.02 * radius);
         }
-        (1.0 - 2.4 * sum / SAMPLES as f64).max(0.0) as f32
+        (1.0 - 4.0 * sum / SAMPLES as f64).max(0.0) as f32
     }
 
     fn smoothed(&self, x: i64, y: i64, [dx, dy]: [i64; 2], radius: f32) -> f32 {

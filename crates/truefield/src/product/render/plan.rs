@@ -140,7 +140,7 @@ impl<'a> Plan<'a> {
         let flat = (b - a).cross(c - a);
         let aligned = if flat.dot(smooth) < 0.0 { -flat } else { flat };
         let normal = if aligned.dot(toward) < 0.0 { -smooth } else { smooth };
-        let paint = triangles.paint.inside(element, triangles.triangles[element], at);
+        let paint = triangles.paint.inside(element, triangles.triangles[element], &triangles.vertices, at);
         let (light, highlight) = lit(paint, normal, toward, triangles.finish);
         Look { light, highlight, cosine: normal.dot(toward) }
     }

@@ -1,6 +1,7 @@
 //! What is in a picture: triangles, points and balls, with their paint.
 
 use super::crease;
+use super::sampled::SurfaceSamples;
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3};
 use crate::mesh::TriangleMesh;
@@ -46,6 +47,8 @@ pub enum Paint {
     ValuePerVertex(Vec<f64>, Ramp),
     /// One value per corner of each triangle, interpolated and then coloured by the ramp; triangles only.
     ValuePerCorner(Vec<[f64; 3]>, Ramp),
+    /// Values at points of the surface, averaged where a pixel sees it and coloured by the ramp; triangles only.
+    Sampled(SurfaceSamples, Ramp),
 }
 
 impl Paint {
@@ -54,6 +57,12 @@ impl Paint {
             Self::Uniform(_) => return Ok(()),
             Self::PerElement(colours) => (colours.len(), Some(elements), "element"),
             Self::PerVertex(colours) => (colours.len(), vertices, "vertex"),
+            Self::Sampled(_, ramp) => {
+                ramp.check()?;
+                return vertices
+                    .map(drop)
+                    .ok_or_else(|| Error::invalid(format!("{what} cannot be painted from samples; only triangles can")));
+            }
             Self::ValuePerElement(values, ramp) => {
                 ramp.check()?;
                 (values.len(), Some(elements), "element")

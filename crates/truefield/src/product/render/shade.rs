@@ -53,12 +53,12 @@ impl Paint {
             Self::PerElement(colours) => decode(colours[element]),
             Self::ValuePerElement(values, ramp) => ramp.light(values[element]),
             Self::Uniform(colour) => decode(*colour),
-            Self::PerVertex(_) | Self::ValuePerVertex(..) | Self::ValuePerCorner(..) => decode(UNKNOWN),
+            Self::PerVertex(_) | Self::ValuePerVertex(..) | Self::ValuePerCorner(..) | Self::Sampled(..) => decode(UNKNOWN),
         }
     }
 
     /// Colour of a triangle at barycentric coordinates.
-    pub(super) fn inside(&self, triangle: usize, corners: [u32; 3], at: [f64; 3]) -> Light {
+    pub(super) fn inside(&self, triangle: usize, corners: [u32; 3], vertices: &[DVec3], at: [f64; 3]) -> Light {
         let blend = |values: [f64; 3]| values[0] * at[0] + values[1] * at[1] + values[2] * at[2];
         match self {
             Self::PerVertex(colours) => {
@@ -67,6 +67,11 @@ impl Paint {
             }
             Self::ValuePerVertex(values, ramp) => ramp.light(blend(corners.map(|v| values[v as usize]))),
             Self::ValuePerCorner(values, ramp) => ramp.light(blend(values[triangle])),
+            Self::Sampled(samples, ramp) => {
+                let [a, b, c] = corners.map(|v| vertices[v as usize]);
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                ramp.light(samples.at(a * at[0] + b * at[1] + c * at[2], normal))
+            }
             _ => self.element(triangle),
         }
     }
@@ -93,12 +98,12 @@ pub(super) fn facing(normal: DVec3, to_viewer: DVec3) -> DVec3 {
 /// normal on the viewer's side. Returns the surface's light and its highlight, which adds to it.
 pub(super) fn lit(base: Light, normal: DVec3, to_viewer: DVec3, finish: Finish) -> (Light, f32) {
     let mut diffuse = 0.0;
-    let mut highlight = 0.0;
     for lamp in LAMPS.iter() {
         diffuse += lamp.strength * normal.dot(lamp.toward).max(0.0);
-        let half = (lamp.toward + to_viewer).normalize_or_zero();
-        highlight += lamp.strength * normal.dot(half).max(0.0).powf(f64::from(finish.shininess));
     }
+    // One highlight, of the key lamp: two would look like two windows.
+    let half = (LAMPS[0].toward + to_viewer).normalize_or_zero();
+    let highlight = normal.dot(half).max(0.0).powf(f64::from(finish.shininess));
     // The sky is brighter than the ground.
     let ambient = 0.9 + 0.1 * normal.y;
     let amount = finish.ambient * ambient as f32 + finish.diffuse * diffuse as f32;

@@ -229,3 +229,168 @@ fn hopeless(e: Estimate) -> bool {
 fn guess(e: Estimate) -> Side {
     if e.value.abs() > 0.5 { Side::PerhapsInside } else { Side::PerhapsOutside }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::Candidate;
+    use std::f64::consts::{PI, TAU};
+
+    fn random(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        }
+    }
+
+    /// Star-shaped, `wild` between 0 (a sphere) and 1 (spikes and pits), cut off above the ring `from`.
+    fn star(wild: f64, from: usize) -> TriangleMesh {
+        let (rings, sectors) = (14, 17);
+        let mut r = random(5);
+        let mut vertices = Vec::new();
+        for i in 0..=rings {
+            for j in 0..sectors {
+                let (t, f) = (PI * i as f64 / rings as f64, TAU * j as f64 / sectors as f64);
+                let radius = 1.0 - wild * r() * 0.95;
+                let pole = i == 0 || i == rings;
+                vertices.push(if pole {
+                    DVec3::Z * if i == 0 { 1.0 } else { -1.0 }
+                } else {
+                    DVec3::new(t.sin() * f.cos(), t.sin() * f.sin(), t.cos()) * radius
+                });
+            }
+        }
+        let at = |i: usize, j: usize| (i * sectors + j % sectors) as u32;
+        let mut triangles = Vec::new();
+        for i in from..rings {
+            for j in 0..sectors {
+                if i + 1 < rings {
+                    triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                }
+                if i > 0 {
+                    triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+                }
+            }
+        }
+        TriangleMesh::new(vertices, triangles).expect("a mesh")
+    }
+
+    struct Asked {
+        mesh: TriangleMesh,
+        tree: Tree,
+        signs: Signs,
+    }
+
+    impl Asked {
+        fn new(mesh: TriangleMesh, choice: SignChoice) -> Self {
+            let tree = Tree::build(&mesh, &Run::default()).expect("a tree");
+            let signs = Signs::new(&mesh, &tree, choice, &Run::default()).expect("signs");
+            Self { mesh, tree, signs }
+        }
+
+        fn foot(&self, p: DVec3) -> (FacetPoint, u32) {
+            let found = self.tree.nearest(p, Candidate::within(f64::INFINITY));
+            (self.tree.facet(found.triangle).nearest(p), found.triangle)
+        }
+
+        fn side(&self, p: DVec3) -> Side {
+            let (foot, triangle) = self.foot(p);
+            self.signs.side(&self.mesh, p, &foot, triangle)
+        }
+
+        /// Near a corner, an edge or a face, as near as rounding allows.
+        fn near(&self, r: &mut impl FnMut() -> f64) -> DVec3 {
+            let [a, b, c] = self.mesh.corners((r() * self.mesh.triangles().len() as f64) as u32);
+            let away = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * 10f64.powf(-16.0 * r());
+            let (s, t) = match (r() * 3.0) as u32 {
+                0 => (0.0, 0.0),
+                1 => (r(), 0.0),
+                _ => (r() * 0.5, r() * 0.5),
+            };
+            a + (b - a) * s + (c - a) * t + away
+        }
+    }
+
+    #[test]
+    fn pseudonormals_and_winding_numbers_never_disagree() {
+        for wild in [0.0, 0.5, 0.8, 1.0] {
+            let asked = Asked::new(star(wild, 0), SignChoice::Auto);
+            assert_eq!(asked.signs.rule.kind, SignKind::Pseudonormal, "{wild}: {}", asked.signs.rule.reason);
+            let (normals, sum) = (asked.signs.pseudonormals.as_ref().expect("normals"), asked.signs.winding.as_ref().expect("a sum"));
+            let mut r = random(17);
+            let (mut both, mut left) = (0, 0);
+            for _ in 0..150_000 {
+                let p = asked.near(&mut r);
+                let (foot, triangle) = asked.foot(p);
+                let by_normal = normals.side(&asked.mesh, p, &foot, triangle);
+                let by_sum = sum.side(p);
+                match by_normal {
+                    Some(height) if by_sum.is_certain() => {
+                        both += 1;
+                        assert_eq!(height < 0.0, by_sum == Side::Inside, "{wild} at {p}: height {height}, {by_sum:?}, {foot:?}");
+                    }
+                    None if foot.distance_squared > 1e-18 => left += 1,
+                    _ => {}
+                }
+            }
+            // Pseudonormals leave next to nothing that is off the surface to the winding number.
+            assert!(both > 100_000 && left < 300, "{wild}: {both} {left}");
+        }
+    }
+
+    #[test]
+    fn a_ball_has_one_side() {
+        for (mesh, choice) in [
+            (star(0.5, 0), SignChoice::Auto),
+            (star(0.5, 0), SignChoice::Winding),
+            (star(0.3, 2), SignChoice::Auto),
+            (star(0.3, 7), SignChoice::Auto),
+            (star(0.3, 7), SignChoice::Pseudonormal),
+            (star(0.3, 7), SignChoice::Unsigned),
+        ] {
+            let asked = Asked::new(mesh, choice);
+            let mut r = random(23);
+            let (mut whole, mut torn) = (0, 0);
+            for _ in 0..20_000 {
+                let p = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * 3.0;
+                let (foot, triangle) = asked.foot(p);
+                let radius = foot.distance_squared.sqrt() * 0.999 * r();
+                let Some(side) = asked.signs.side_of_ball(&asked.mesh, p, &foot, triangle, radius) else {
+                    torn += 1;
+                    continue;
+                };
+                whole += 1;
+                assert!(side.is_certain());
+                for _ in 0..8 {
+                    let q = p + DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5).normalize_or_zero() * (radius * r());
+                    let there = asked.side(q);
+                    assert!(there == side || !there.is_certain(), "{choice:?}: ball of {radius} around {p} is {side:?}, {q} is {there:?}");
+                }
+            }
+            let sure = asked.signs.changes_at_surface_only();
+            let unproven = choice == SignChoice::Pseudonormal;
+            assert!(
+                if sure {
+                    torn == 0
+                } else if unproven {
+                    whole == 0
+                } else {
+                    whole > torn
+                },
+                "{choice:?}: {whole} {torn}"
+            );
+        }
+    }
+
+    #[test]
+    fn reasons_name_the_fault() {
+        let reason = |mesh: TriangleMesh, choice| Asked::new(mesh, choice).signs.rule;
+        let open = reason(star(0.3, 7), SignChoice::Auto);
+        assert_eq!(open.kind, SignKind::Winding);
+        assert!(open.reason.starts_with("17 open edges (the first joins vertices"), "{}", open.reason);
+        let forced = reason(star(0.3, 7), SignChoice::Pseudonormal);
+        assert_eq!(forced.kind, SignKind::Pseudonormal);
+        assert!(forced.reason.contains("not proven") && forced.reason.contains("17 open edges"), "{}", forced.reason);
+    }
+}
