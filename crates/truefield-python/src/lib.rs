@@ -1,5 +1,8 @@
 //! The Python extension module `truefield._truefield`: convert, one door, convert back.
 
+// Python has keyword arguments; their number is no burden there.
+#![allow(clippy::too_many_arguments)]
+
 mod check;
 mod contour;
 mod convert;

@@ -137,7 +137,6 @@ impl PyScene {
 
     /// Adds a mesh: `colours` are the paint, or the ramp of `values`; `ink` is colour, opacity and width in pixels of its lines.
     #[pyo3(signature = (vertices, triangles, colours, per = "whole", values = None, span = None, finish = "satin", opacity = 1.0, ink = None))]
-    #[allow(clippy::too_many_arguments)]
     fn add_mesh(
         &mut self,
         vertices: PyReadonlyArray2<'_, f64>,
@@ -183,7 +182,6 @@ impl PyScene {
 
     /// Adds points as discs that face along their normals; without a radius it is taken from their distances.
     #[pyo3(signature = (points, normals, colours, per = "whole", values = None, span = None, finish = "satin", radius = None))]
-    #[allow(clippy::too_many_arguments)]
     fn add_points(
         &mut self,
         points: PyReadonlyArray2<'_, f64>,
@@ -209,7 +207,6 @@ impl PyScene {
 
     /// Adds balls.
     #[pyo3(signature = (centers, radii, colours, per = "whole", values = None, span = None, finish = "polished", opacity = 1.0))]
-    #[allow(clippy::too_many_arguments)]
     fn add_balls(
         &mut self,
         centers: PyReadonlyArray2<'_, f64>,
@@ -243,7 +240,6 @@ impl PyScene {
 
     /// Draws: (height, width, 4) uint8 colours with straight opacity, and (height, width) float32 depths.
     #[pyo3(signature = (camera, width, height, samples = 9, background = None, occlusion = 0.0, threads = None, progress = None))]
-    #[allow(clippy::too_many_arguments)]
     fn render<'py>(
         &self,
         py: Python<'py>,

@@ -115,12 +115,12 @@ impl<'a> Sampler<'a> {
 
     fn visit(&mut self, at: Visit<'_>) -> Step {
         let side = self.sides.of_block(&at);
-        if at.range.lower > self.band {
-            if let Some(side) = side {
-                let value = (side.sign() * self.band / self.surface.scale()) as f32;
-                self.fill(&at.block, value);
-                return Step::Done;
-            }
+        if at.range.lower > self.band
+            && let Some(side) = side
+        {
+            let value = (side.sign() * self.band / self.surface.scale()) as f32;
+            self.fill(&at.block, value);
+            return Step::Done;
         }
         if at.block.edge() > EDGE {
             return if at.list.len() <= SHORT && self.band == f64::INFINITY { Step::Share } else { Step::Refine };
