@@ -167,6 +167,16 @@ def test_a_contour_shows_through_the_part_and_without_holes(tmp_path: Path) -> N
     assert warm[inside].all()
 
 
+def test_a_contour_outside_the_part_fits_into_the_picture() -> None:
+    cloud = ball_cloud()
+    outside = tf.PointCloud(0.5 + (cloud.points - 0.5) * 5.0, cloud.normals)
+    image = pictures.contour_picture(cube(), outside, view="front", size=SMALL)
+    border = np.concatenate([pixels(image)[0], pixels(image)[-1], pixels(image)[:, 0], pixels(image)[:, -1]])
+    assert (border == 255).all()
+    red, _, blue = np.moveaxis(pixels(image), 2, 0)
+    assert (red - blue > 40).sum() == pytest.approx(math.pi * (0.44 * SMALL[1]) ** 2, rel=0.04)
+
+
 def test_a_transparent_background_is_transparent() -> None:
     image = pictures.contour_picture(cube(), ball_cloud(), size=SMALL, background=None)
     assert image.mode == "RGBA"

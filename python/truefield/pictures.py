@@ -48,7 +48,7 @@ _GLASS: Final[Colour] = (138, 172, 205)
 _METAL: Final[Colour] = (196, 204, 212)
 _WARM: Final[Colour] = (233, 106, 38)
 _LINES: Final[Colour] = (24, 36, 50)
-_CLEARNESS: Final = 0.13
+_CLEARNESS: Final = 0.11
 _OCCLUSION: Final = 0.7
 _LEAST, _MOST = 64, 16384
 
@@ -87,7 +87,9 @@ def contour_picture(
     scene = Scene()
     _add_part(scene, mesh, size, opacity=_CLEARNESS)
     _add_points(scene, cloud, radius, colour)
-    image = _render(scene, _camera(mesh, view), size, background, (threads, progress))
+    # A contour outside the part must fit into the picture too; some of its points say how far it reaches.
+    reach = cloud.points[:: max(1, len(cloud) // 100_000)]
+    image = _render(scene, _camera(mesh, view, reach), size, background, (threads, progress))
     return _finished(image, path)
 
 
@@ -400,8 +402,10 @@ def _check_size(size: tuple[int, int]) -> None:
         )
 
 
-def _camera(mesh: TriangleMesh, view: View, margin: float = 0.06) -> Camera:
-    points = np.ascontiguousarray(mesh.vertices[np.unique(mesh.triangles)])
+def _camera(mesh: TriangleMesh, view: View, more: Array | None = None, *, margin: float = 0.06) -> Camera:
+    points = mesh.vertices[np.unique(mesh.triangles)]
+    if more is not None:
+        points = np.concatenate([points, more])
     if isinstance(view, str):
         return Camera(points, view, margin=margin)
     try:

@@ -5,6 +5,9 @@ use super::facing::Facing;
 use super::plan::{Plan, Seen};
 use super::tile::{Area, Pattern};
 
+/// Discs blend with those behind them up to this many radii.
+const BLEND: f64 = 2.5;
+
 /// Nearest opaque surfaces of a tile, per pixel and sample.
 pub(super) struct Visible<const N: usize> {
     pub area: Area,
@@ -74,14 +77,15 @@ impl<const N: usize> Visible<N> {
         }
     }
 
-    /// Blends the light of all discs within one radius of the nearest one, heavier near their centres.
+    /// Blends the light of all discs close behind the nearest one, heavier near their centres: where a disc sticks out
+    /// over a sharp edge, the surface behind it outweighs its rim.
     pub fn blend_splats(&mut self, plan: &Plan<'_>, tile: usize, pattern: &Pattern<N>) {
         if plan.splats.iter().all(|bins| bins.of(tile).is_empty()) {
             return;
         }
         let mut sums = vec![[[0.0_f32; 4]; N]; self.area.len()];
         for (layer, bins) in plan.splats.iter().enumerate() {
-            let reach = plan.scene.splats[layer].radius as f32;
+            let reach = (BLEND * plan.scene.splats[layer].radius) as f32;
             for &element in bins.of(tile) {
                 let disc = plan.disc(layer, element as usize);
                 let Some(bounds) = disc.bounds(&plan.lens) else { continue };
