@@ -8,6 +8,7 @@ from truefield.errors import FileError, TruefieldError
 from truefield.fields import CompleteField, Nearest, SampledField, SignRule, Surface, complete_field
 from truefield.io import read, read_points
 from truefield.mesh import TriangleMesh
+from truefield.storage import load
 
 __all__ = [
     "CompleteField",
@@ -22,6 +23,7 @@ __all__ = [
     "TruefieldError",
     "__version__",
     "complete_field",
+    "load",
     "read",
     "read_points",
     "shapes",

@@ -10,7 +10,18 @@ _Floats = NDArray[np.float64]
 _Progress = Callable[[str, float], None] | None
 _NearestArrays = tuple[_Floats, _Floats, NDArray[np.int64], NDArray[np.uint8], _Floats]
 
-__all__ = ["Camera", "CompleteField", "SampledField", "Scene", "Surface", "__version__", "check_mesh", "contour"]
+__all__ = [
+    "Camera",
+    "CompleteField",
+    "SampledField",
+    "Scene",
+    "Surface",
+    "__version__",
+    "check_mesh",
+    "complete_field_from_parts",
+    "complete_field_parts",
+    "contour",
+]
 
 __version__: str
 
@@ -53,6 +64,8 @@ class CompleteField:
     def surface(self) -> Surface: ...
     @property
     def grid(self) -> tuple[list[float], float, tuple[int, int, int]]: ...
+    @property
+    def first(self) -> list[int]: ...
     @property
     def region(self) -> str: ...
     def statistics(self) -> dict[str, float]: ...
@@ -177,3 +190,17 @@ def contour(
     threads: int | None = None,
     progress: _Progress = None,
 ) -> tuple[_Floats, _Floats, NDArray[np.int64]]: ...
+def complete_field_parts(
+    field: CompleteField, threads: int | None = None, progress: _Progress = None
+) -> dict[str, NDArray[Any]]: ...
+def complete_field_from_parts(
+    surface: Surface,
+    origin: list[float],
+    cell_size: float,
+    first: list[int],
+    shape: list[int],
+    region: str,
+    parts: dict[str, NDArray[Any]],
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> CompleteField: ...

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from truefield import _truefield
 from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
+from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
 
 Floats = NDArray[np.float64]
@@ -107,7 +108,7 @@ class Surface(_Answering):
         TruefieldError: the mesh or an argument cannot be used.
     """
 
-    __slots__ = ("_mesh",)
+    __slots__ = ("_mesh", "_sign")
     _native: _truefield.Surface
 
     def __init__(
@@ -119,12 +120,18 @@ class Surface(_Answering):
                 f"a Surface is made from a TriangleMesh, not from {type(mesh).__name__}; read it first"
             )
         self._mesh = mesh
+        self._sign: Sign = sign
         self._native = _truefield.Surface(mesh.vertices, mesh.triangles, sign, threads, progress)
 
     @property
     def mesh(self) -> TriangleMesh:
         """The part."""
         return self._mesh
+
+    @property
+    def sign(self) -> Sign:
+        """The sign rule that was asked for; `sign_rule` is the one that decides."""
+        return self._sign
 
     @property
     def sign_rule(self) -> SignRule:
@@ -269,6 +276,20 @@ class CompleteField(_Answering):
         the lists; bytes of lists and cells, and the bytes the paper's layout (4 n + 5 for n triangles in a cell) takes.
         """
         return self._native.statistics()
+
+    def save(self, path: PathLike, *, threads: int | None = None, progress: Progress | None = None) -> None:
+        """Writes the field with its mesh to one file, by custom named `.tfield`; `truefield.load` reads it.
+
+        The loaded field answers the same, bit for bit, and is saved to the same bytes. The file appears whole or not
+        at all, is about as large as the field and the mesh, and carries checksums; `truefield.storage` says what is
+        where. Takes memory for a copy of the lists.
+
+        Raises:
+            FileError: the file cannot be written.
+        """
+        from truefield import storage
+
+        storage.save(self, path, threads=threads, progress=progress)
 
     def contour(
         self,

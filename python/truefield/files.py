@@ -23,7 +23,7 @@ def replacing(path: PathLike) -> Iterator[IO[bytes]]:
     (`/dev/stdout`) are written directly.
 
     Raises:
-        FileError: the folder does not exist, cannot be written, or `path` is a folder.
+        FileError: the folder does not exist, cannot be written or is full, or `path` is a folder.
     """
     target = Path(path)
     check_file(target)
@@ -35,10 +35,8 @@ def replacing(path: PathLike) -> Iterator[IO[bytes]]:
     aside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
         with _explained(Path(path)):
-            stream = aside.open("xb")
-        with stream:
-            yield stream
-        with _explained(Path(path)):
+            with aside.open("xb") as stream:
+                yield stream
             aside.replace(target)
     except BaseException:
         with suppress(OSError):

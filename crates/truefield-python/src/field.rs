@@ -22,7 +22,7 @@ type Floats<'py> = Bound<'py, PyArray1<f64>>;
 pub struct PyCompleteField(pub Arc<CompleteField>);
 
 /// The region that a name stands for.
-fn region(name: &str) -> PyResult<Region> {
+pub fn region(name: &str) -> PyResult<Region> {
     match name {
         "everywhere" => Ok(Region::Everywhere),
         "inside" => Ok(Region::Inside),
@@ -60,6 +60,12 @@ impl PyCompleteField {
     fn grid(&self) -> ([f64; 3], f64, [u32; 3]) {
         let grid = self.0.grid();
         (grid.origin.to_array(), grid.spacing, grid.shape)
+    }
+
+    /// Global index of the grid's first cell.
+    #[getter]
+    fn first(&self) -> [i64; 3] {
+        self.0.grid().first
     }
 
     #[getter]

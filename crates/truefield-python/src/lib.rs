@@ -9,6 +9,7 @@ mod convert;
 mod door;
 mod field;
 mod render;
+mod store;
 mod surface;
 
 use pyo3::prelude::*;
@@ -23,5 +24,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<render::PyScene>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(contour::contour_of, module)?)?;
+    module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
+    module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     Ok(())
 }

@@ -21,7 +21,7 @@ pub mod source;
 
 pub use distance::{Closest, Distance};
 pub use error::{Error, Result};
-pub use field::{CompleteField, SampledField};
+pub use field::{CompleteField, Parts, SampledField};
 pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
 pub use grid::Grid;
 pub use mesh::TriangleMesh;

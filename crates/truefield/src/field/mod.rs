@@ -1,7 +1,9 @@
 //! Stored representations: layout and lookup, no construction.
 
 pub mod complete;
+pub mod parts;
 pub mod sampled;
 
 pub use complete::CompleteField;
+pub use parts::Parts;
 pub use sampled::SampledField;
