@@ -70,7 +70,7 @@ pub fn field_of(
 }
 
 /// The array of a part, which is not copied.
-fn array<'py, T: Element>(py: Python<'py>, part: Cow<'static, [T]>) -> Bound<'py, PyArray1<T>> {
+fn array<'py, T: Element + Clone>(py: Python<'py>, part: Cow<'static, [T]>) -> Bound<'py, PyArray1<T>> {
     part.into_owned().into_pyarray(py)
 }
 
@@ -79,6 +79,6 @@ fn named<'py, T: Element>(parts: &Bound<'py, PyDict>, name: &str) -> PyResult<Py
     parts.get_item(name)?.and_then(|array| array.extract().ok()).ok_or_else(wrong)
 }
 
-fn items<'a, T: Element>(array: &'a PyReadonlyArray1<'_, T>) -> PyResult<Cow<'a, [T]>> {
+fn items<'a, T: Element + Clone>(array: &'a PyReadonlyArray1<'_, T>) -> PyResult<Cow<'a, [T]>> {
     array.as_slice().map(Cow::Borrowed).map_err(|_| raise(Error::Format("the arrays of a field must be contiguous".into())))
 }
