@@ -248,18 +248,18 @@ def heavy_sections_picture(
     for (center, radius), colour in zip(pairs, palette, strict=True):
         scene.add_balls(center[None, :], np.array([radius]), np.array([colour], dtype=np.uint8))
     top = edge + round(3.6 * text)
-    shown = min(count, max(1, int((size[1] - top - edge) / (1.5 * text)) - 1))
+    shown = min(count, max(1, int((size[1] - top - edge) / (1.75 * text)) - 1))
     rows = [f"ball of diameter {number(2.0 * radius)}" for _, radius in pairs[:shown]]
     column = round(max([width_of(row, text) for row in rows], default=0.0) + 2.4 * text) + edge if rows else edge
     box = (edge, top, size[0] - column - edge // 2, size[1] - edge)
     _place(page, scene, camera, box, (threads, progress))
     left = size[0] - column
     for index, row in enumerate(rows):
-        y = top + 1.5 * text * (index + 0.5)
+        y = top + 1.75 * text * (index + 0.5)
         _badge(page, (left + 0.6 * text, y), str(index + 1), text, palette[index])
         write(draw, (left + 1.8 * text, y), row, text, anchor="lm")
     if shown < count:
-        y = top + 1.5 * text * (shown + 0.5)
+        y = top + 1.75 * text * (shown + 0.5)
         write(draw, (left + 1.8 * text, y), f"and {count - shown} more", text, colour=FAINT, anchor="lm")
     if pairs:
         wide, high = box[2] - box[0], box[3] - box[1]
