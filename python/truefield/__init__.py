@@ -9,6 +9,7 @@ from truefield.fields import CompleteField, Nearest, SampledField, SignRule, Sur
 from truefield.io import read, read_points
 from truefield.mesh import TriangleMesh
 from truefield.storage import load
+from truefield.thickness import ThicknessReport, thickness
 
 __all__ = [
     "CompleteField",
@@ -19,6 +20,7 @@ __all__ = [
     "SampledField",
     "SignRule",
     "Surface",
+    "ThicknessReport",
     "TriangleMesh",
     "TruefieldError",
     "__version__",
@@ -27,4 +29,5 @@ __all__ = [
     "read",
     "read_points",
     "shapes",
+    "thickness",
 ]

@@ -28,6 +28,23 @@ __version__: str
 def check_mesh(
     vertices: _Floats, triangles: NDArray[np.int64], threads: int | None = None, progress: _Progress = None
 ) -> dict[str, Any]: ...
+def thickness(
+    surface: Surface,
+    tolerance: float,
+    above: float | None = None,
+    below: float | None = None,
+    spacing: float | None = None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> dict[str, Any]: ...
+def walls_at(
+    surface: Surface,
+    points: _Floats,
+    triangles: NDArray[np.int64],
+    largest: float,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[_Floats, NDArray[np.uint8]]: ...
 
 @final
 class Surface:

@@ -11,6 +11,7 @@ mod field;
 mod render;
 mod store;
 mod surface;
+mod thickness;
 
 use pyo3::prelude::*;
 
@@ -23,6 +24,8 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
+    module.add_function(wrap_pyfunction!(thickness::thickness, module)?)?;
+    module.add_function(wrap_pyfunction!(thickness::walls_at, module)?)?;
     module.add_function(wrap_pyfunction!(contour::contour_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;

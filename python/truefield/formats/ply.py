@@ -255,13 +255,13 @@ def _enough(element: _Element, enough: bool) -> None:
         raise FormatError(f"it is truncated: it ends within the {element.rows} elements '{element.name}' it declares")
 
 
-def encode(mesh: TriangleMesh) -> bytes:
-    """Binary little endian, double vertices, uchar-counted faces with unsigned indices."""
+def encode(mesh: TriangleMesh, scalars: Mapping[str, NDArray[np.generic]] | None = None) -> bytes:
+    """Binary little endian, double vertices with `scalars`, uchar-counted faces with unsigned indices."""
     faces = np.empty(len(mesh.triangles), dtype=[("count", "u1"), ("corners", "<u4", 3)])
     faces["count"] = 3
     faces["corners"] = mesh.triangles
     header = f"element face {len(faces)}\nproperty list uchar uint vertex_indices\n"
-    return encode_points(dict(zip("xyz", mesh.vertices.T, strict=True)), header) + faces.tobytes()
+    return encode_points(dict(zip("xyz", mesh.vertices.T, strict=True)) | dict(scalars or {}), header) + faces.tobytes()
 
 
 def encode_points(columns: Mapping[str, NDArray[np.generic]], further: str = "") -> bytes:

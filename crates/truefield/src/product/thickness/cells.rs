@@ -21,8 +21,11 @@ use super::game;
 /// Cells of level `LEVELS` have the lattice's unit as their edge.
 pub(super) const LEVELS: u32 = 20;
 
-/// Cells handed to a worker at a time: some milliseconds of work.
+/// Corners handed to a worker at a time: some hundred microseconds of work.
 const BLOCK: usize = 256;
+
+/// Cells whose children a worker looks at in one go.
+const PARENTS: usize = 32;
 
 /// A cell of the octree: `2^level` of them along the root's edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -60,11 +63,20 @@ impl Cell {
         (index[axis] < 1 << LEVELS).then(|| encode(index))
     }
 
-    fn corner_codes(self) -> [u64; 8] {
-        let [x, y, z] = decode(self.code);
-        let edge = self.edge();
-        std::array::from_fn(|k| encode([x + edge * (k as u32 & 1), y + edge * (k as u32 >> 1 & 1), z + edge * (k as u32 >> 2)]))
+    /// Codes of the 27 corners of the children, x running fastest.
+    fn lattice_codes(self) -> [u64; 27] {
+        let low = decode(self.code);
+        let half = self.edge() / 2;
+        let axis = |a: usize| [0, 1, 2].map(|i| spread(low[a] + half * i) << a);
+        let [x, y, z] = [axis(0), axis(1), axis(2)];
+        std::array::from_fn(|k| x[k % 3] | y[k / 3 % 3] | z[k / 9])
     }
+}
+
+/// Where in [`Cell::lattice_codes`] corner `corner` of child `child` is.
+fn lattice_index(child: usize, corner: usize) -> usize {
+    let axis = |a: usize| (child >> a & 1) + (corner >> a & 1);
+    axis(0) + 3 * axis(1) + 9 * axis(2)
 }
 
 /// Spreads the lowest 21 bits to every third bit.
@@ -94,7 +106,7 @@ fn decode(code: u64) -> [u32; 3] {
     [gather(code), gather(code >> 1), gather(code >> 2)]
 }
 
-/// A cell to look at, with the depth that it must exceed to be of interest.
+/// A cell to split, with the depth that its children must exceed to be of interest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ask {
     pub cell: Cell,
@@ -130,6 +142,8 @@ pub(super) struct Octree<'a> {
     surface: &'a Surface,
     origin: DVec3,
     unit: f64,
+    /// Whether the side can change at the surface only.
+    closed: bool,
     /// Rounding error of a distance, in model units.
     pub rounding: f64,
 }
@@ -140,7 +154,13 @@ impl<'a> Octree<'a> {
         let extent = surface.mesh().extent();
         let side = extent.size().max_element() * (1.0 + 1e-9);
         let unit = side / f64::from(1 << LEVELS);
-        Self { surface, origin: extent.center() - 0.5 * side, unit, rounding: rounding(&extent) }
+        Self {
+            surface,
+            origin: extent.center() - 0.5 * side,
+            unit,
+            closed: surface.side_changes_at_surface_only(),
+            rounding: rounding(&extent),
+        }
     }
 
     /// Length of a cell's diagonal.
@@ -157,10 +177,11 @@ impl<'a> Octree<'a> {
         self.origin + DVec3::from(index.map(f64::from)) * self.unit
     }
 
-    /// Looks at cells and keeps what `digest` makes of those that may reach deeper than asked for.
+    /// Looks at the children of cells and keeps what `digest` makes of those that may reach deeper than asked for.
     ///
-    /// Where the cell is known to be deeper than `enough`, in one place or in all, the best upper
-    /// bound is not looked for. The result is as long as `asked`, `None` for cells that are not deep enough.
+    /// Where a child is known to be deeper than `enough`, in one place or in all, the best upper
+    /// bound is not looked for. The result holds eight entries for each cell asked: what was made
+    /// of the child, `None` if it is not deep enough, and the upper bound of its depth.
     pub fn look<T: Send>(
         &self,
         asked: &[Ask],
@@ -169,7 +190,7 @@ impl<'a> Octree<'a> {
         digest: impl Fn(&View<'_>) -> T + Sync,
     ) -> Result<Vec<(Option<T>, f64)>> {
         let quiet = Run { progress: &Silent, ..*run };
-        let mut codes: Vec<u64> = asked.iter().flat_map(|ask| ask.cell.corner_codes()).collect();
+        let mut codes: Vec<u64> = asked.iter().flat_map(|ask| ask.cell.lattice_codes()).collect();
         codes.sort_unstable();
         codes.dedup();
         let blocks = codes.len().div_ceil(BLOCK);
@@ -179,17 +200,19 @@ impl<'a> Octree<'a> {
                 Ok(self.corners(codes))
             })?
             .concat();
-        let blocks = asked.len().div_ceil(BLOCK);
+        let blocks = asked.len().div_ceil(PARENTS);
         let views = quiet.blocks("cells", blocks, |block| {
-            let asked = &asked[block * BLOCK..asked.len().min((block + 1) * BLOCK)];
+            let asked = &asked[block * PARENTS..asked.len().min((block + 1) * PARENTS)];
             let mut columns = Vec::with_capacity(8);
-            Ok(asked
-                .iter()
-                .map(|ask| {
-                    let eight = ask.cell.corner_codes().map(|code| corners[codes.partition_point(|&c| c < code)]);
-                    self.view(*ask, &eight, enough, &mut columns, &digest)
-                })
-                .collect::<Vec<_>>())
+            let mut seen = Vec::with_capacity(8 * asked.len());
+            for ask in asked {
+                let lattice = ask.cell.lattice_codes().map(|code| corners[codes.partition_point(|&c| c < code)]);
+                for (child, cell) in ask.cell.children().enumerate() {
+                    let eight = std::array::from_fn(|corner| lattice[lattice_index(child, corner)]);
+                    seen.push(self.view(Ask { cell, ..*ask }, &eight, enough, &mut columns, &digest));
+                }
+            }
+            Ok(seen)
         })?;
         Ok(views.into_iter().flatten().collect())
     }
@@ -197,7 +220,6 @@ impl<'a> Octree<'a> {
     /// Distances and sides of corners in Morton order: each starts from what its predecessor tells.
     fn corners(&self, codes: &[u64]) -> Vec<Corner> {
         let (tree, scale) = (self.surface.tree(), self.surface.scale());
-        let carries = self.surface.side_changes_at_surface_only();
         let mut warm = 0;
         // A point whose side is certain, and its distance: the ball around it is on one side.
         let mut known: Option<(DVec3, f64, Side)> = None;
@@ -209,7 +231,7 @@ impl<'a> Octree<'a> {
             warm = found.triangle;
             let distance = found.distance_squared.sqrt() / scale;
             let side = match known {
-                Some((at, clear, side)) if carries && at.distance(p) < clear - self.rounding => side,
+                Some((at, clear, side)) if self.closed && at.distance(p) < clear - self.rounding => side,
                 _ => self.surface.side(q, &tree.facet(warm).nearest(q), warm),
             };
             if side.is_certain() {
@@ -218,6 +240,21 @@ impl<'a> Octree<'a> {
             Corner { side, distance, element: found.triangle }
         };
         codes.iter().map(corner).collect()
+    }
+
+    /// The one side of a cell that the surface does not meet, if it has one.
+    fn side(&self, bounds: &Aabb, radius: f64, corners: &[Corner; 8]) -> Option<Side> {
+        if self.closed {
+            return corners.iter().map(|c| c.side).find(|side| side.is_certain());
+        }
+        // In the holes of an open mesh the side changes away from the surface: ask about the ball around the cell.
+        let (tree, scale) = (self.surface.tree(), self.surface.scale());
+        let q = bounds.center() * scale;
+        let found = tree.nearest(q, Candidate::within(f64::INFINITY));
+        if found.distance_squared.sqrt() <= radius * scale {
+            return None;
+        }
+        self.surface.side_of_ball(q, &tree.facet(found.triangle).nearest(q), found.triangle, radius * scale)
     }
 
     /// The view of one cell handed to `digest`, and the upper bound that was reached.
@@ -235,19 +272,20 @@ impl<'a> Octree<'a> {
         let distances = corners.map(|c| c.distance);
         let smallest = distances.iter().copied().fold(f64::INFINITY, f64::min);
         // 1-Lipschitz, counting corners outside as negative.
-        let reach = corners.iter().map(|c| if c.side == Side::Outside { -c.distance } else { c.distance }).fold(f64::INFINITY, f64::min);
+        let outside = |c: &Corner| self.closed && c.side == Side::Outside;
+        let reach = corners.iter().map(|c| if outside(c) { -c.distance } else { c.distance }).fold(f64::INFINITY, f64::min);
         let mut upper = reach + diagonal + self.rounding;
         if upper <= ask.exceed {
             return (None, upper);
         }
         let clearance = smallest * smallest - radius * radius;
         let clear = smallest > self.rounding && clearance > 0.0;
-        if clear && corners.iter().any(|c| c.side == Side::Outside) {
-            return (None, f64::NEG_INFINITY);
-        }
-        let inside = clear && corners.iter().all(|c| c.side == Side::Inside);
-        let lower = if inside { clearance.sqrt() - self.rounding } else { f64::NEG_INFINITY };
         let bounds = self.bounds(cell);
+        let inside = match if clear { self.side(&bounds, radius, corners) } else { None } {
+            Some(Side::Outside) => return (None, f64::NEG_INFINITY),
+            side => side == Some(Side::Inside),
+        };
+        let lower = if inside { clearance.sqrt() - self.rounding } else { f64::NEG_INFINITY };
         let (mut best, mut place) = (f64::NEG_INFINITY, bounds.center());
         for (k, corner) in corners.iter().enumerate() {
             if corner.side == Side::Inside && corner.distance > best {

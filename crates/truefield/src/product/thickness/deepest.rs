@@ -88,36 +88,37 @@ pub(super) fn deepest(
         run.cancel.check()?;
         let mut asked = Vec::new();
         let mut owners = Vec::new();
-        while asked.len() < 8 * ROUND {
+        while asked.len() < ROUND {
             let Some(open) = heap.pop() else { break };
             let exceed = (best[open.region].0 + slack).max(floor);
             if open.upper <= exceed || open.cell.level == LEVELS {
                 aside[open.region] = aside[open.region].max(open.upper);
                 continue;
             }
-            for cell in open.cell.children() {
-                asked.push(Ask { cell, exceed });
-                owners.push(open.region);
-            }
+            asked.push(Ask { cell: open.cell, exceed });
+            owners.push(open.region);
         }
         let seen = octree.look(&asked, f64::INFINITY, run, |view| (view.best, view.place))?;
-        for (owner, (found, _)) in owners.iter().zip(&seen) {
+        let owner_of = |child: usize| owners[child / 8];
+        for (child, (found, _)) in seen.iter().enumerate() {
             if let Some((depth, place)) = *found {
-                let (known, at) = &mut best[*owner];
+                let (known, at) = &mut best[owner_of(child)];
                 if depth > *known || (depth == *known && before(place, *at)) {
                     (*known, *at) = (depth, place);
                 }
             }
         }
-        for ((ask, owner), (found, upper)) in asked.iter().zip(&owners).zip(seen) {
-            if found.is_some() && upper > (best[*owner].0 + slack).max(floor) {
-                heap.push(Open { promise: promise(upper, best[*owner].0), upper, region: *owner, cell: ask.cell });
+        let children = asked.iter().flat_map(|ask| ask.cell.children());
+        for ((child, cell), (found, upper)) in children.enumerate().zip(seen) {
+            let region = owner_of(child);
+            if found.is_some() && upper > (best[region].0 + slack).max(floor) {
+                heap.push(Open { promise: promise(upper, best[region].0), upper, region, cell });
             } else {
-                aside[*owner] = aside[*owner].max(upper);
+                aside[region] = aside[region].max(upper);
             }
         }
         rounds += 1;
-        looked += asked.len();
+        looked += 8 * asked.len();
         run.progress.report(phase, rounds, rounds + heap.len().div_ceil(ROUND));
     }
     for open in heap {

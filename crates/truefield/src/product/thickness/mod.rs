@@ -24,6 +24,7 @@ use samples::Sampler;
 use wall::Gauge;
 
 use crate::error::{Error, Result};
+use crate::geom::DVec3;
 use crate::run::Run;
 use crate::source::mesh::{SignKind, Surface};
 
@@ -106,6 +107,24 @@ pub fn wall_thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Re
     let octree = Octree::new(surface);
     let greatest = deepest_place(surface, &octree, tolerance, run)?;
     measure(surface, &sampler, octree.rounding, greatest.depth.upper, (above, below), run)
+}
+
+/// The walls at given points of triangles, measured as [`wall_thickness`] does.
+///
+/// `largest` must not be less than the part's greatest depth; a greater value costs a little time.
+pub fn walls_at(surface: &Surface, places: &[(DVec3, u32)], largest: f64, run: &Run<'_>) -> Result<Vec<Sample>> {
+    let count = surface.mesh().triangles().len();
+    if let Some((index, (p, t))) = places.iter().enumerate().find(|(_, (p, t))| !p.is_finite() || *t as usize >= count) {
+        return Err(Error::invalid(format!("place {index} is {p} on triangle {t}; give finite points on triangles 0 to {}", count - 1)));
+    }
+    check_limit("largest", largest)?;
+    let sampler = Sampler::new(surface.mesh(), None)?;
+    let gauge = Gauge::new(surface, cells::rounding(&surface.mesh().extent()), largest);
+    let blocks = run.blocks("wall thickness", places.len().div_ceil(CHUNK), |block| {
+        let places = &places[block * CHUNK..places.len().min((block + 1) * CHUNK)];
+        Ok(places.iter().map(|&(p, t)| gauge.sample(&sampler.at(p, t))).collect::<Vec<_>>())
+    })?;
+    Ok(blocks.concat())
 }
 
 fn measure(

@@ -133,10 +133,15 @@ impl<'a> Sampler<'a> {
             (s, t) = (1.0 - s, 1.0 - t);
         }
         let [a, b, c] = self.mesh.corners(triangle as u32);
-        let point = a + (b - a) * s + (c - a) * t;
-        let (normal, slack) = self.smoothed(triangle, point);
         let count = self.starts[triangle + 1] - self.starts[triangle];
-        Place { point, normal, triangle: triangle as u32, area: self.areas[triangle] / count as f64, slack }
+        let place = self.at(a + (b - a) * s + (c - a) * t, triangle as u32);
+        Place { area: self.areas[triangle] / count as f64, ..place }
+    }
+
+    /// A given point of a triangle, as a sample that stands for no area.
+    pub fn at(&self, point: DVec3, triangle: u32) -> Place {
+        let (normal, slack) = self.smoothed(triangle as usize, point);
+        Place { point, normal, triangle, area: 0.0, slack }
     }
 
     /// The normal of the curved wall that the facets stand for.

@@ -120,21 +120,22 @@ impl Search<'_> {
         let mut leaves = Vec::new();
         let mut cells = vec![Cell::ROOT];
         while !cells.is_empty() {
-            let level = cells[0].level as usize;
-            run.progress.report("heavy sections", level, level + 1);
+            let level = cells[0].level + 1;
+            run.progress.report("heavy sections", level as usize, level as usize + 1);
             let mut open = Vec::new();
             for leaf in self.look(&cells, run)? {
                 if leaf.state == State::Open { open.push(leaf) } else { leaves.push(leaf) }
             }
-            if leaves.len() + 8 * open.len() > BUDGET || level as u32 == LEVELS {
+            if leaves.len() + 8 * open.len() > BUDGET || level == LEVELS {
                 leaves.append(&mut open);
             }
-            cells = open.iter().flat_map(|leaf| leaf.cell.children()).collect();
+            cells = open.iter().map(|leaf| leaf.cell).collect();
         }
         leaves.sort_unstable_by_key(|leaf| leaf.cell.code);
         Ok(leaves)
     }
 
+    /// The children of the cells that may hold a deep point.
     fn look(&self, cells: &[Cell], run: &Run<'_>) -> Result<Vec<Leaf>> {
         let asked: Vec<Ask> = cells.iter().map(|&cell| Ask { cell, exceed: self.depth }).collect();
         let seen = self.octree.look(&asked, self.depth, run, |view| self.leaf(view))?;
@@ -219,7 +220,7 @@ impl Search<'_> {
             }
             budget -= 8 * wide.len();
             wide.sort_unstable_by_key(|&i| leaves[i].cell.code);
-            let cells: Vec<Cell> = wide.iter().flat_map(|&i| leaves[i].cell.children()).collect();
+            let cells: Vec<Cell> = wide.iter().map(|&i| leaves[i].cell).collect();
             let mut split = vec![false; leaves.len()];
             for &i in &wide {
                 split[i] = true;
