@@ -41,6 +41,7 @@ def walls_at(
     surface: Surface,
     points: _Floats,
     triangles: NDArray[np.int64],
+    tolerance: float,
     largest: float,
     threads: int | None = None,
     progress: _Progress = None,

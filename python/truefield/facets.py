@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from truefield.mesh import TriangleMesh
 
-_MOST_FACETS = 400_000
 
-
-def refined(mesh: TriangleMesh, longest: float) -> tuple[TriangleMesh, NDArray[np.int64]]:
+def refined(mesh: TriangleMesh, longest: float, most: int = 1_000_000) -> tuple[TriangleMesh, NDArray[np.int64]]:
     """The same surface with no edge longer than `longest`, and for each triangle the one that it is a part of.
 
-    Edges are halved again and again, the same way for all triangles that share one, so no cracks appear. Stops early
-    at 400,000 triangles.
+    Edges are halved again and again, the same way for all triangles that share one, so no cracks appear. Stops
+    early where it would take more than `most` triangles.
     """
     vertices, triangles = mesh.vertices, mesh.triangles.astype(np.int64)
     parents = np.arange(len(triangles), dtype=np.int64)
@@ -22,7 +20,7 @@ def refined(mesh: TriangleMesh, longest: float) -> tuple[TriangleMesh, NDArray[n
         ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
         lengths = np.linalg.norm(vertices[ends[..., 0]] - vertices[ends[..., 1]], axis=-1)
         marked = lengths > longest
-        if not marked.any() or len(triangles) + int(marked.sum()) > _MOST_FACETS:
+        if not marked.any() or len(triangles) + int(marked.sum()) > most:
             return TriangleMesh(vertices, triangles, name=mesh.name), parents
         edges, inverse = np.unique(ends[marked], axis=0, return_inverse=True)
         middles = np.full(triangles.shape, -1, dtype=np.int64)

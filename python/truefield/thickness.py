@@ -43,6 +43,7 @@ FILES: Final = (
 )
 _PERCENTILES: Final = (1, 5, 95, 99)
 _MOST_BALLS: Final = 100
+_MOST_FACETS: Final = 250_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +263,7 @@ class ThicknessReport:
         """Writes the report into a folder; all files appear together, or none. Returns their paths.
 
         `report.json` as `to_json`; `samples.csv`, one row a sample; `heavy-sections.csv`, one row a section;
-        `thickness.ply`, the part with its facets split to the sample spacing and the ball's diameter at each vertex as
+        `thickness.ply`, the part with large facets split and the ball's diameter at each vertex as
         the scalar `thickness`; and the pictures `histogram.png`, `thickness.png` and `heavy-sections.png`.
 
         Args:
@@ -374,11 +375,23 @@ class ThicknessReport:
 
     def _chart(self, threads: int | None) -> tuple[TriangleMesh, _Floats]:
         """The part with small facets, and the ball's diameter on each; NaN near sharp edges and on inner faces."""
-        mesh, parents = refined(self._surface.mesh, 2.0 * self.walls.spacing)
-        centers = np.ascontiguousarray(mesh.vertices[mesh.triangles].mean(axis=1))
-        largest = self.greatest_depth.depth.upper
-        values, kinds = _truefield.walls_at(self._surface._native, centers, parents, largest, threads)
-        return mesh, np.where(kinds == 0, values, np.nan)
+        mesh, parents = refined(self._surface.mesh, 3.0 * self.walls.spacing, most=_MOST_FACETS)
+        # Facets that were not split have samples of their own.
+        found = self.samples
+        walls = found.kind == 0
+        triangle, area = found.triangle[walls], found.area[walls]
+        areas = np.bincount(triangle, area, self.triangles)
+        sums = np.bincount(triangle, area * found.thickness_sphere[walls], self.triangles)
+        values = np.where(areas > 0.0, sums / np.where(areas > 0.0, areas, 1.0), np.nan)[parents]
+        split = np.flatnonzero(np.bincount(parents, minlength=self.triangles)[parents] > 1)
+        if len(split):
+            centers = np.ascontiguousarray(mesh.vertices[mesh.triangles[split]].mean(axis=1))
+            largest = self.greatest_depth.depth.upper
+            balls, kinds = _truefield.walls_at(
+                self._surface._native, centers, parents[split], self.tolerance, largest, threads
+            )
+            values[split] = np.where(kinds == 0, balls, np.nan)
+        return mesh, values
 
     def _write_mesh(self, path: Path, mesh: TriangleMesh, values: _Floats) -> None:
         """Each vertex gets the mean of the facets around it, by area; near sharp edges that of the nearest walls."""

@@ -45,12 +45,13 @@ pub fn thickness<'py>(
 
 /// Ball diameters and kinds at given places of the surface; NaN on inner faces.
 #[pyfunction]
-#[pyo3(signature = (surface, points, triangles, largest, threads=None, progress=None))]
+#[pyo3(signature = (surface, points, triangles, tolerance, largest, threads=None, progress=None))]
 pub fn walls_at<'py>(
     py: Python<'py>,
     surface: &PySurface,
     points: PyReadonlyArray2<'py, f64>,
     triangles: PyReadonlyArray1<'py, i64>,
+    tolerance: f64,
     largest: f64,
     threads: Option<usize>,
     progress: Option<&Bound<'py, PyAny>>,
@@ -59,7 +60,7 @@ pub fn walls_at<'py>(
     let places: Vec<(DVec3, u32)> =
         self::points(&points)?.into_iter().zip(triangles.iter().map(|&t| u32::try_from(t).unwrap_or(u32::MAX))).collect();
     let surface = &surface.0;
-    let samples = job(py, threads, progress, |run| product::thickness::walls_at(surface, &places, largest, run))?;
+    let samples = job(py, threads, progress, |run| product::thickness::walls_at(surface, &places, tolerance, largest, run))?;
     Ok((column(py, samples.iter().map(|s| diameter(s.sphere))), column(py, samples.iter().map(|s| code(s.kind)))))
 }
 

@@ -369,6 +369,23 @@ fn walls_between_shells_inside_out_meshes_and_flipped_triangles() {
 }
 
 #[test]
+fn an_open_box_is_as_deep_as_its_winding_number_says() {
+    // Without its lid the box has no inside near the opening, but it has one near its floor.
+    let part = cuboid(DVec3::new(20.0, 20.0, 20.0));
+    let lid = |t: &[u32; 3]| t.iter().all(|&v| part.vertices()[v as usize].z == 20.0);
+    let open = TriangleMesh::new(part.vertices().to_vec(), part.triangles().iter().copied().filter(|t| !lid(t)).collect()).expect("a mesh");
+    let solid = surface(open);
+    let found = greatest_depth(&solid, 0.1, &Run::default()).expect("a depth");
+    let at = solid.at(found.point);
+    assert!(at.upper < 0.0 && -at.upper >= found.depth.lower, "{found:?} {at:?}");
+    // No inside point that a lattice finds is deeper than certified.
+    for i in 0..40 * 40 * 40 {
+        let p = DVec3::new(f64::from(i % 40), f64::from(i / 40 % 40), f64::from(i / 1600)) * 0.6 - 2.0;
+        assert!(-solid.at(p).upper <= found.depth.upper, "{p}");
+    }
+}
+
+#[test]
 fn bad_arguments_are_refused_with_a_sentence() {
     let solid = surface(cuboid(DVec3::new(3.0, 4.0, 5.0)));
     let run = Run::default();

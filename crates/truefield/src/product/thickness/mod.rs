@@ -84,7 +84,7 @@ pub fn thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Result<
     check_tolerance(surface, tolerance)?;
     check_limits(above, below)?;
     // First of all what the user may have to correct.
-    let sampler = Sampler::new(surface.mesh(), spacing)?;
+    let sampler = Sampler::new(surface.mesh(), spacing, tolerance)?;
     let octree = Octree::new(surface);
     let greatest = deepest_place(surface, &octree, tolerance, run)?;
     let heavy = above.map(|above| sections::sections(&octree, 0.5 * above, tolerance, run)).transpose()?;
@@ -96,14 +96,14 @@ pub fn thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Result<
 ///
 /// The samples follow a low-discrepancy sequence on each triangle and do not depend on the number
 /// of threads. The ball at a sample is inscribed for certain: its diameter is twice the distance of
-/// its centre. On a flat wall it touches the sample and is the largest such ball up to rounding; on
-/// the facets of a curved wall it may stay [`Sample::slack`] away from the sample, and its diameter
-/// is then off by about twice that. Some ten tree queries a sample.
+/// its centre. On a flat wall it touches the sample and is the largest such ball up to rounding.
+/// Facets that stray from a curved wall by no more than the tolerance are taken for that wall: there
+/// the ball may stay [`Sample::slack`] away from the sample, and its diameter is off by about twice that. Some ten tree queries a sample.
 pub fn wall_thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Result<Walls> {
     let Options { tolerance, above, below, spacing } = *options;
     check_tolerance(surface, tolerance)?;
     check_limits(above, below)?;
-    let sampler = Sampler::new(surface.mesh(), spacing)?;
+    let sampler = Sampler::new(surface.mesh(), spacing, tolerance)?;
     let octree = Octree::new(surface);
     let greatest = deepest_place(surface, &octree, tolerance, run)?;
     measure(surface, &sampler, octree.rounding, greatest.depth.upper, (above, below), run)
@@ -112,13 +112,14 @@ pub fn wall_thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Re
 /// The walls at given points of triangles, measured as [`wall_thickness`] does.
 ///
 /// `largest` must not be less than the part's greatest depth; a greater value costs a little time.
-pub fn walls_at(surface: &Surface, places: &[(DVec3, u32)], largest: f64, run: &Run<'_>) -> Result<Vec<Sample>> {
+pub fn walls_at(surface: &Surface, places: &[(DVec3, u32)], tolerance: f64, largest: f64, run: &Run<'_>) -> Result<Vec<Sample>> {
     let count = surface.mesh().triangles().len();
     if let Some((index, (p, t))) = places.iter().enumerate().find(|(_, (p, t))| !p.is_finite() || *t as usize >= count) {
         return Err(Error::invalid(format!("place {index} is {p} on triangle {t}; give finite points on triangles 0 to {}", count - 1)));
     }
+    check_tolerance(surface, tolerance)?;
     check_limit("largest", largest)?;
-    let sampler = Sampler::new(surface.mesh(), None)?;
+    let sampler = Sampler::new(surface.mesh(), None, tolerance)?;
     let gauge = Gauge::new(surface, cells::rounding(&surface.mesh().extent()), largest);
     let blocks = run.blocks("wall thickness", places.len().div_ceil(CHUNK), |block| {
         let places = &places[block * CHUNK..places.len().min((block + 1) * CHUNK)];

@@ -5,7 +5,7 @@ use crate::geom::{DVec3, Facet};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 
-/// Neighbouring triangles that turn by less than this are facets of one curved wall; 40 degrees.
+/// Neighbouring triangles that turn by less than this may be facets of one curved wall; 40 degrees.
 const CREASE: f64 = 0.766_044_443_118_978;
 
 /// Normals this close are those of one plane.
@@ -49,11 +49,14 @@ pub(super) struct Sampler<'a> {
     starts: Vec<usize>,
     pub spacing: f64,
     pub area: f64,
+    tolerance: f64,
 }
 
 impl<'a> Sampler<'a> {
     /// One sample per `spacing^2` of area on average, and at least one on every triangle of positive area.
-    pub fn new(mesh: &'a TriangleMesh, spacing: Option<f64>) -> Result<Self> {
+    ///
+    /// Facets are taken for those of a curved wall where they stray from it by no more than `tolerance`.
+    pub fn new(mesh: &'a TriangleMesh, spacing: Option<f64>, tolerance: f64) -> Result<Self> {
         let count = mesh.triangles().len();
         let (mut normals, mut areas) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for t in 0..count as u32 {
@@ -105,7 +108,7 @@ impl<'a> Sampler<'a> {
                 next[v as usize] += 1;
             }
         }
-        Ok(Self { mesh, normals, areas, corners, first, around, starts, spacing, area })
+        Ok(Self { mesh, normals, areas, corners, first, around, starts, spacing, area, tolerance })
     }
 
     /// Number of samples.
@@ -170,12 +173,16 @@ impl<'a> Sampler<'a> {
                 let across = normal - own;
                 let theirs = self.mesh.corners(other as u32);
                 let width = span(&corners, across).min(span(&theirs, across)) / across.length();
+                let stray = 0.125 * width * turn.acos();
+                if stray > self.tolerance {
+                    continue;
+                }
                 let [a, b, c] = theirs;
                 let near = 1.0 - 2.0 * Facet::new(a, b, c).distance_squared(p).sqrt() / width;
                 if near.is_nan() || near <= 0.0 {
                     continue;
                 }
-                slack = slack.max(0.25 * width * turn.acos());
+                slack = slack.max(2.0 * stray);
                 // Triangles of one plane count once, by the nearest.
                 let weight = near / (2.0 - near);
                 match others.iter_mut().find(|(n, _)| n.dot(normal) >= SAME) {

@@ -9,7 +9,7 @@ use super::samples::Place;
 use crate::bvh::{Candidate, Ray};
 use crate::distance::Distance;
 use crate::geom::DVec3;
-use crate::source::mesh::Surface;
+use crate::source::mesh::{SignKind, Surface};
 
 /// Balls tried at most; a dozen is much.
 const STEPS: usize = 100;
@@ -66,6 +66,8 @@ pub(super) struct Gauge<'a> {
     surface: &'a Surface,
     /// Rounding error of a distance.
     rounding: f64,
+    /// Whether the rule for sides follows the orientation of the triangles.
+    oriented: bool,
     /// Distance at which the two sides of the surface are told apart.
     aside: f64,
     /// No inscribed ball has a larger radius.
@@ -84,16 +86,17 @@ impl<'a> Gauge<'a> {
     /// `largest` is an upper bound of the part's greatest depth.
     pub fn new(surface: &'a Surface, rounding: f64, largest: f64) -> Self {
         let aside = (1e-7 * surface.mesh().extent().diagonal()).max(100.0 * rounding);
-        Self { surface, rounding, aside, largest }
+        let oriented = surface.sign_rule().kind == SignKind::Pseudonormal;
+        Self { surface, rounding, oriented, aside, largest }
     }
 
     pub fn sample(&self, place: &Place) -> Sample {
         let &Place { point, normal, triangle, area, slack } = place;
         let sample = Sample { point, normal, triangle, area, kind: Kind::Inner, sphere: None, ray: None, slack };
-        // The orientation of the triangle is no proof: ask both sides.
-        let behind = self.inside(point - normal * self.aside);
-        let before = self.inside(point + normal * self.aside);
-        if behind == before {
+        // Where pseudonormals decide, the inside is behind the triangles; else ask both sides.
+        let behind = self.oriented || self.inside(point - normal * self.aside);
+        let before = !self.oriented && self.inside(point + normal * self.aside);
+        if behind == before || normal == DVec3::ZERO {
             return sample;
         }
         let inward = if behind { -normal } else { normal };
