@@ -76,7 +76,7 @@ impl Meetings {
             clearance: solid.iter().map(|&s| if s { [open(reach), open(1.0)] } else { [open(0.0), open(0.0)] }).collect(),
         };
         let blocks = run.blocks("self-intersections", count.div_ceil(BLOCK), |block| {
-            let (mut found, mut near) = (Vec::new(), Vec::new());
+            let (mut found, mut near, mut stack) = (Vec::new(), Vec::new(), Vec::new());
             let mut complete = true;
             for first in block * BLOCK..((block + 1) * BLOCK).min(count) {
                 if !solid[first] {
@@ -91,7 +91,7 @@ impl Meetings {
                 near.clear();
                 let box_of = |t: u32| Aabb::around(mesh.corners(t));
                 let wide = box_of(first).grow(reach * 1.001);
-                tree.overlapping(&wide, |t| {
+                tree.overlapping(&wide, &mut stack, |t| {
                     if t > first && solid[t as usize] && wide.overlaps(&box_of(t)) {
                         near.push(t);
                     }
@@ -116,8 +116,15 @@ impl Meetings {
     fn part(&self, mesh: &TriangleMesh, topology: &Topology, pair: [u32; 2], reach: f64) -> bool {
         let [mine, other] = pair.map(|t| topology.triangles[t as usize]);
         let [corners, others] = pair.map(|t| mesh.corners(t));
-        let shared: Vec<(usize, usize)> = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).filter(|&(i, j)| mine[i] == other[j]).collect();
-        match *shared.as_slice() {
+        let mut shared = [(0, 0); 3];
+        let mut count = 0;
+        for i in 0..3 {
+            if let Some(j) = other.iter().position(|&v| v == mine[i]) {
+                shared[count] = (i, j);
+                count += 1;
+            }
+        }
+        match shared[..count] {
             [] => {
                 let gap = gap(&corners, &others, reach);
                 for t in pair {
@@ -147,12 +154,14 @@ impl Meetings {
 }
 
 impl Tree {
-    /// Calls `visit` for every triangle whose box may share a point with `bounds`, and for some others.
-    pub(crate) fn overlapping(&self, bounds: &Aabb, mut visit: impl FnMut(u32)) {
+    /// Calls `visit` for every triangle whose box may share a point with `bounds`, and for some others;
+    /// `stack` is scratch.
+    pub(crate) fn overlapping(&self, bounds: &Aabb, stack: &mut Vec<u32>, mut visit: impl FnMut(u32)) {
         let outward = |x: f64, up: bool| if up { (x as f32).next_up() } else { (x as f32).next_down() };
         let min: [f32; 3] = std::array::from_fn(|axis| outward(bounds.min[axis] - self.center[axis], false));
         let max: [f32; 3] = std::array::from_fn(|axis| outward(bounds.max[axis] - self.center[axis], true));
-        let mut stack = vec![0u32];
+        stack.clear();
+        stack.push(0);
         while let Some(child) = stack.pop() {
             if child & LEAF != 0 {
                 let packet = &self.packets[(child & !LEAF) as usize];
