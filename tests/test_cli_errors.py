@@ -14,6 +14,7 @@ from solids import cube
 from test_io import BAD_FILES
 
 LINES = {
+    "thickness": ["thickness", "{part}", "--above", "0.5", "--tolerance", "0.1", "--output", "{folder}/report"],
     "contour": ["contour", "{part}", "--depth", "0.2", "--tolerance", "0.1", "-o", "{folder}/out.ply"],
     "info": ["info", "{part}"],
     "distance": ["distance", "{part}", "--points", "{points}", "-o", "{folder}/out.csv"],
@@ -75,6 +76,15 @@ def test_missing_parts(truefield: Command, folder: Path, command: str, missing: 
         ("contour", "threads", "0", "--threads"),
         ("contour", "sign", "guess", "--sign"),
         ("contour", "placement", "anywhere", "--placement"),
+        ("thickness", "tolerance", "0", "tolerance"),
+        ("thickness", "tolerance", "-0.1", "tolerance"),
+        ("thickness", "tolerance", "nan", "tolerance"),
+        ("thickness", "tolerance", "1e-30", "tolerance"),
+        ("thickness", "above", "-1", "above"),
+        ("thickness", "above", "nan", "above"),
+        ("thickness", "above", "1000", "above"),
+        ("thickness", "below", "0", "below"),
+        ("thickness", "threads", "-1", "--threads"),
         ("distance", "threads", "0", "--threads"),
         ("distance", "sign", "guess", "--sign"),
         ("info", "sign", "guess", "--sign"),
@@ -110,7 +120,7 @@ def test_bad_points(truefield: Command, folder: Path, name: str, content: bytes 
     assert not list((folder / "out").iterdir())
 
 
-@pytest.mark.parametrize("command", ["distance", "contour"])
+@pytest.mark.parametrize("command", ["distance", "contour", "thickness"])
 @pytest.mark.parametrize("place", ["none/out.ply", "cube.stl/out.ply", "/proc/self/out.ply"])
 def test_unwritable_places(truefield: Command, folder: Path, command: str, place: str) -> None:
     if place.startswith("/") and not Path(place).parent.is_dir():
@@ -120,7 +130,7 @@ def test_unwritable_places(truefield: Command, folder: Path, command: str, place
     assert sorted(folder.rglob("*")) == before
 
 
-@pytest.mark.parametrize(("command", "place"), [("distance", "out"), ("contour", "out")])
+@pytest.mark.parametrize(("command", "place"), [("distance", "out"), ("contour", "out"), ("thickness", "cube.stl")])
 def test_a_file_for_a_folder_and_a_folder_for_a_file(
     truefield: Command, folder: Path, command: str, place: str
 ) -> None:

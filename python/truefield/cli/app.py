@@ -9,6 +9,7 @@ import typer
 from truefield.cli.contour import contour
 from truefield.cli.distance import distance
 from truefield.cli.info import info
+from truefield.cli.thickness import thickness
 
 app = typer.Typer(
     name="truefield",
@@ -18,7 +19,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (info, contour, distance):
+for command in (info, thickness, contour, distance):
     app.command()(command)
 
 
