@@ -272,6 +272,21 @@ fn closed_solids_and_what_people_do_to_them() {
 }
 
 #[test]
+fn edges_split_on_one_side_only() {
+    // Every edge of the first face is split there, and in no neighbour.
+    let face = [[DVec3::ZERO, DVec3::Z, DVec3::new(0.0, 1.0, 1.0)], [DVec3::ZERO, DVec3::new(0.0, 1.0, 1.0), DVec3::Y]];
+    let mut soup: Soup = cube().into_iter().filter(|t| t.iter().any(|v| v.x > 0.0)).collect();
+    assert_eq!(soup.len(), 10);
+    for [a, b, c] in face {
+        let (ab, bc, ca) = ((a + b) * 0.5, (b + c) * 0.5, (c + a) * 0.5);
+        soup.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]);
+    }
+    assert_eq!(surface(&soup).sign_rule().kind, SignKind::Winding);
+    let open = compare("split edges", &soup, &cube(), 20_000);
+    assert!(open < 100, "{open} left open");
+}
+
+#[test]
 fn duplicates_count_once_or_cancel() {
     let ball = sphere(16, 21, 0);
     // Every face written twice.
