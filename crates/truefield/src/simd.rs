@@ -1,14 +1,31 @@
 //! Run-time choice of vector instructions: the same Rust body compiled several times.
 //!
-//! This is the only file of the crate with `unsafe`: calling a function compiled for instructions
-//! that were just detected. Exact (f64) results never use fused operations, so they are the same
-//! bits at every level; only single-precision filters, whose error is budgeted, may fuse.
+//! This is the only file of the crate with `unsafe`: calling functions compiled for instructions that were
+//! just detected, and the comparison of vectors, which no compiler finds by itself. Exact (f64) results never
+//! use fused operations, so they are the same bits at every level; only single-precision filters, whose error
+//! is budgeted, may fuse.
 
-/// How `a * b + c` is computed in single-precision filters.
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64 as intrinsics;
+
+/// How `a * b + c` is computed in single-precision filters, and how vectors are compared.
 pub(crate) trait Fuse: Copy {
     fn mul_add(a: f32, b: f32, c: f32) -> f32;
 
     /// Bit i: `a[i] <= b[i]`.
+    fn mask_not_above(a: &[f32; 16], b: &[f32; 16]) -> u32;
+}
+
+/// Two roundings: any machine.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain;
+
+impl Fuse for Plain {
+    #[inline(always)]
+    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
+        a * b + c
+    }
+
     #[inline(always)]
     fn mask_not_above(a: &[f32; 16], b: &[f32; 16]) -> u32 {
         let mut mask = 0;
@@ -19,25 +36,52 @@ pub(crate) trait Fuse: Copy {
     }
 }
 
-/// Two roundings: any machine.
+/// One rounding, eight lanes: only instantiated by `multiversion!` where AVX2 and FMA were detected.
+#[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
-pub(crate) struct Plain;
+pub(crate) struct Avx2;
 
-/// One rounding: machines with fused multiply-add.
-#[derive(Clone, Copy)]
-pub(crate) struct Fused;
-
-impl Fuse for Plain {
-    #[inline(always)]
-    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
-        a * b + c
-    }
-}
-
-impl Fuse for Fused {
+#[cfg(target_arch = "x86_64")]
+impl Fuse for Avx2 {
     #[inline(always)]
     fn mul_add(a: f32, b: f32, c: f32) -> f32 {
         a.mul_add(b, c)
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn mask_not_above(a: &[f32; 16], b: &[f32; 16]) -> u32 {
+        // SAFETY: AVX2 was detected; both halves of both arrays are eight floats, and loads need no alignment.
+        unsafe {
+            let half = |start: usize| {
+                let (a, b) = (intrinsics::_mm256_loadu_ps(a[start..].as_ptr()), intrinsics::_mm256_loadu_ps(b[start..].as_ptr()));
+                intrinsics::_mm256_movemask_ps(intrinsics::_mm256_cmp_ps::<{ intrinsics::_CMP_LE_OQ }>(a, b)) as u32
+            };
+            half(0) | half(8) << 8
+        }
+    }
+}
+
+/// One rounding, sixteen lanes: only instantiated by `multiversion!` where AVX-512 was detected.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512;
+
+#[cfg(target_arch = "x86_64")]
+impl Fuse for Avx512 {
+    #[inline(always)]
+    fn mul_add(a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn mask_not_above(a: &[f32; 16], b: &[f32; 16]) -> u32 {
+        // SAFETY: AVX-512 was detected; both arrays are sixteen floats, and loads need no alignment.
+        unsafe {
+            let (a, b) = (intrinsics::_mm512_loadu_ps(a.as_ptr()), intrinsics::_mm512_loadu_ps(b.as_ptr()));
+            u32::from(intrinsics::_mm512_cmp_ps_mask::<{ intrinsics::_CMP_LE_OQ }>(a, b))
+        }
     }
 }
 
@@ -54,11 +98,11 @@ macro_rules! multiversion {
             {
                 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma")]
                 fn wide($($argument: $kind),*) $(-> $result)? {
-                    $body::<$crate::simd::Fused>($($argument),*)
+                    $body::<$crate::simd::Avx512>($($argument),*)
                 }
                 #[target_feature(enable = "avx2,fma")]
                 fn middle($($argument: $kind),*) $(-> $result)? {
-                    $body::<$crate::simd::Fused>($($argument),*)
+                    $body::<$crate::simd::Avx2>($($argument),*)
                 }
                 if std::arch::is_x86_feature_detected!("avx512f")
                     && std::arch::is_x86_feature_detected!("avx512vl")

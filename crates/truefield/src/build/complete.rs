@@ -9,6 +9,7 @@ use std::sync::Arc;
 use super::sides::Sides;
 use crate::bvh::cover::Range;
 use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
+use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
 use crate::field::CompleteField;
 use crate::field::complete::{ABSENT, CELLS, CellBlock, CellClass, CellList, CellWord, EDGE, Entries, LONG, Region, block_range};
@@ -146,11 +147,13 @@ struct Builder<'a> {
     done: Vec<([i64; 3], CellBlock)>,
     current: Option<([i64; 3], Draft)>,
     sides: Sides<'a>,
+    /// Memory for one list.
+    list: Vec<u32>,
 }
 
 impl<'a> Builder<'a> {
     fn new(surface: &'a Surface, region: Region) -> Self {
-        Self { surface, region, done: Vec::new(), current: None, sides: Sides::new(surface) }
+        Self { surface, region, done: Vec::new(), current: None, sides: Sides::new(surface), list: Vec::new() }
     }
 
     fn visit(&mut self, at: Visit<'_>) -> Result<Step> {
@@ -180,18 +183,24 @@ impl<'a> Builder<'a> {
     }
 
     fn class_of_cell(&self, at: &Visit<'_>) -> CellClass {
-        let touched = at.list.iter().any(|&t| triangle_overlaps_box(self.surface.work().corners(t), &at.cell));
+        let corners = |slot: Slot| self.surface.work().corners(self.surface.tree().triangle(slot));
+        let touched = at.list.iter().any(|&slot| triangle_overlaps_box(corners(slot), &at.cell));
         if touched { CellClass::Surface } else { class(self.sides.of_clear_box(at)) }
     }
 
-    fn fill(&mut self, block: &Block, class: CellClass, list: Option<&[u32]>) {
+    fn fill(&mut self, block: &Block, class: CellClass, list: Option<&[Slot]>) {
         let place = block.low.map(|i| i.div_euclid(EDGE as i64));
         if self.current.as_ref().is_none_or(|(current, _)| *current != place) {
             self.seal();
             self.current = Some((place, Draft::new()));
         }
         let Some((_, draft)) = &mut self.current else { return };
-        let word = (class as u16) << 14 | list.map_or(ABSENT, |list| draft.list(list, LONGEST));
+        let word = (class as u16) << 14
+            | list.map_or(ABSENT, |list| {
+                self.list.clear();
+                self.list.extend(list.iter().map(|&slot| self.surface.tree().triangle(slot)));
+                draft.list(&self.list, LONGEST)
+            });
         for i in block.low[0]..block.high[0] {
             for j in block.low[1]..block.high[1] {
                 for k in block.low[2]..block.high[2] {

@@ -2,6 +2,7 @@
 
 use crate::bvh::descend::{Block, Visit};
 use crate::bvh::evaluate::{Answers, BLOCK, Points};
+use crate::bvh::tree::Slot;
 use crate::bvh::{Candidate, Tree};
 use crate::geom::DVec3;
 use crate::source::mesh::{Side, Surface};
@@ -79,13 +80,13 @@ impl<'a> Sides<'a> {
 }
 
 /// The nearest triangle of a point, from the complete list of a box around it where that is short.
-fn nearest(tree: &Tree, list: &[u32], p: DVec3) -> Candidate {
+fn nearest(tree: &Tree, list: &[Slot], p: DVec3) -> Candidate {
     let mut best = Candidate::within(f64::INFINITY);
     if list.is_empty() || list.len() > SEARCHED {
         return tree.nearest(p, best);
     }
-    for &triangle in list {
-        best.offer(tree.facet(triangle).distance_squared(p), triangle);
+    for &slot in list {
+        best.offer(tree.facet_at(slot).distance_squared(p), tree.triangle(slot));
     }
     best
 }

@@ -1,7 +1,7 @@
 //! Building the tree: surface area heuristic over bins, then eight children a node.
 
 use super::frame::Frame;
-use super::tree::{ABSENT, LEAF, Node, Packet, Tree, WIDTH};
+use super::tree::{ABSENT, LEAF, Node, Packet, Slot, Tree, WIDTH};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, Facet};
 use crate::mesh::TriangleMesh;
@@ -18,6 +18,8 @@ struct Builder<'a> {
     center: DVec3,
     nodes: Vec<Node>,
     packets: Vec<Packet>,
+    /// In the order of the packets.
+    triangles: Vec<u32>,
 }
 
 /// A run of the order array and its box.
@@ -50,11 +52,17 @@ impl Tree {
         run.cancel.check()?;
         let extent = mesh.extent();
         let center = extent.center();
-        let mut builder = Builder { boxes: &boxes, facets: &facets, center, nodes: Vec::new(), packets: Vec::new() };
+        let mut builder = Builder { boxes: &boxes, facets: &facets, center, nodes: Vec::new(), packets: Vec::new(), triangles: Vec::new() };
         let mut order: Vec<u32> = (0..count as u32).collect();
         builder.node(Part { order: &mut order, bounds: extent }, 0, run)?;
-        let Builder { nodes, packets, .. } = builder;
-        Ok(Self { nodes, packets, facets, frames, extent, center, radius: extent.radius() })
+        let Builder { nodes, packets, triangles, .. } = builder;
+        let mut slots = vec![Slot(0); count];
+        for (slot, &triangle) in triangles.iter().enumerate() {
+            slots[triangle as usize] = Slot(slot as u32);
+        }
+        let facets = triangles.iter().map(|&t| facets[t as usize]).collect();
+        let frames = triangles.iter().map(|&t| frames[t as usize]).collect();
+        Ok(Self { nodes, packets, facets, frames, triangles, slots, extent, center, radius: extent.radius() })
     }
 }
 
@@ -92,7 +100,17 @@ impl Builder<'_> {
     fn packet(&mut self, order: &mut [u32]) -> u32 {
         order.sort_unstable();
         let zero = [[0.0; WIDTH]; 3];
-        let mut packet = Packet { a: zero, ab: zero, ac: zero, v: zero, inverse: zero, slope: [0.0; WIDTH], triangle: [0; WIDTH] };
+        let mut packet = Packet {
+            a: zero,
+            ab: zero,
+            ac: zero,
+            v: zero,
+            inverse: zero,
+            slope: [0.0; WIDTH],
+            triangle: [0; WIDTH],
+            first: self.triangles.len() as u32,
+            count: order.len() as u32,
+        };
         for lane in 0..WIDTH {
             let triangle = order[lane.min(order.len() - 1)];
             let facet = &self.facets[triangle as usize];
@@ -106,6 +124,7 @@ impl Builder<'_> {
             packet.slope[lane] = facet.slope;
             packet.triangle[lane] = triangle;
         }
+        self.triangles.extend_from_slice(order);
         self.packets.push(packet);
         (self.packets.len() - 1) as u32
     }

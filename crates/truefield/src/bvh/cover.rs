@@ -9,11 +9,9 @@
 
 use super::frame::{FILTER_ERROR, Offsets};
 use super::nearest::Candidate;
-use super::tree::{ABSENT, LEAF, Tree, WIDTH};
-use crate::geom::{Aabb, DVec3};
+use super::tree::{ABSENT, LEAF, Slot, Tree, WIDTH};
+use crate::geom::{Aabb, DVec3, Facet};
 use crate::simd::{Fuse, multiversion};
-
-const CORNERS: usize = 8;
 
 /// Bounds of the unsigned distance over a box.
 #[derive(Clone, Copy, Debug)]
@@ -27,39 +25,52 @@ impl Range {
     pub const ALL: Self = Self { lower: 0.0, upper: f64::INFINITY };
 }
 
+/// Corners of a box, and witnesses of a box.
+const CORNERS: usize = 8;
+
+/// Boxes shortened in one go: the octants of a block.
+pub(crate) const OCTANTS: usize = 8;
+
+/// Two boxes a vector.
+const LANES: usize = 2 * CORNERS;
+const PAIRS: usize = OCTANTS / 2;
+
 /// Memory that is used again from box to box.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    corners: Vec<[f32; CORNERS]>,
+    rows: Vec<[[f32; LANES]; PAIRS]>,
     stack: Vec<u32>,
 }
 
 /// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending, if distances in
 /// `window` can occur there.
-pub(crate) fn gather(tree: &Tree, cell: &Aabb, window: Range, scratch: &mut Scratch, out: &mut Vec<u32>) -> Range {
+pub(crate) fn gather(tree: &Tree, cell: &Aabb, window: Range, scratch: &mut Scratch, out: &mut Vec<Slot>) -> Range {
     let center = cell.center();
     let first = tree.nearest(center, Candidate::within(f64::INFINITY));
-    let witness = tree.facets[first.triangle as usize].nearest(center).point;
+    let witness = tree.facet(first.triangle).nearest(center).point;
     let distance = first.distance_squared.sqrt();
     let range = Range { lower: (distance - cell.radius()).max(0.0), upper: distance + cell.radius() };
-    if range.lower > window.upper || range.upper < window.lower {
-        out.clear();
-        return range;
+    out.clear();
+    if range.lower <= window.upper && range.upper >= window.lower {
+        collect(tree, cell, witness, &mut scratch.stack, out);
+        out.sort_unstable();
     }
-    let mut rough = Vec::new();
-    collect(tree, cell, witness, &mut scratch.stack, &mut rough);
-    rough.sort_unstable();
-    rough.dedup();
-    refine(tree, cell, &rough, scratch, out)
+    range
 }
 
 multiversion!(
-    /// Fills `out` with those triangles of `list`, a complete list of a box around `cell`, that can be
-    /// nearest somewhere in `cell`; keeps their order.
-    pub(crate) fn refine(tree: &Tree, cell: &Aabb, list: &[u32], scratch: &mut Scratch, out: &mut Vec<u32>) -> Range = refine_body
+    /// Fills `out[i]` with those triangles of `list`, a complete list of a box around all `cells`, that can be
+    /// nearest somewhere in `cells[i]`; keeps their order. Returns the range of every cell.
+    pub(crate) fn refine(
+        tree: &Tree,
+        cells: &[Aabb],
+        list: &[Slot],
+        scratch: &mut Scratch,
+        out: &mut [Vec<Slot>; OCTANTS],
+    ) -> [Range; OCTANTS] = refine_body
 );
 
-multiversion!(fn collect(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut Vec<u32>, out: &mut Vec<u32>) = collect_body);
+multiversion!(fn collect(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut Vec<u32>, out: &mut Vec<Slot>) = collect_body);
 
 /// How far single-precision distances from points of `cell` may be off.
 pub(crate) fn filter_error(tree: &Tree, cell: &Aabb) -> f64 {
@@ -68,7 +79,7 @@ pub(crate) fn filter_error(tree: &Tree, cell: &Aabb) -> f64 {
 
 /// Descends into every node that the witness does not rule out for the whole cell.
 #[inline(always)]
-fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut Vec<u32>, out: &mut Vec<u32>) {
+fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut Vec<u32>, out: &mut Vec<Slot>) {
     let (low, high, q) = (cell.min - tree.center, cell.max - tree.center, witness - tree.center);
     let size = low.abs().max(high.abs()).max_element() + tree.radius;
     // Rounding of sums of squares of coordinates up to `size`.
@@ -96,7 +107,8 @@ fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut V
                 continue;
             }
             if child & LEAF != 0 {
-                out.extend_from_slice(&tree.packets[(child & !LEAF) as usize].triangle);
+                let packet = &tree.packets[(child & !LEAF) as usize];
+                out.extend((packet.first..packet.first + packet.count).map(Slot));
             } else {
                 stack.push(child);
             }
@@ -105,54 +117,99 @@ fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut V
 }
 
 #[inline(always)]
-fn refine_body<F: Fuse>(tree: &Tree, cell: &Aabb, list: &[u32], scratch: &mut Scratch, out: &mut Vec<u32>) -> Range {
-    let center = cell.center();
-    let offsets = Offsets::<CORNERS>::from_fn(|corner| cell.corner(corner) - center);
-    let error = filter_error(tree, cell) as f32;
-    let squared = &mut scratch.corners;
-    squared.clear();
-    let mut least = [f32::INFINITY; CORNERS];
-    let mut nearest = [0u32; CORNERS];
-    for &triangle in list {
-        let mut row = [0.0; CORNERS];
-        tree.frames[triangle as usize].distances_squared::<F, CORNERS>(center, &offsets, &mut row);
-        for lane in 0..CORNERS {
-            let nearer = row[lane] < least[lane];
-            least[lane] = if nearer { row[lane] } else { least[lane] };
-            nearest[lane] = if nearer { triangle } else { nearest[lane] };
-        }
-        squared.push(row);
-    }
-    // Squared distances from every corner to every witness, too large rather than too small by all errors.
-    let mut reach = [[0.0f32; CORNERS]; CORNERS];
-    let mut upper = f32::INFINITY;
-    for witness in 0..CORNERS {
-        let q = tree.facets[nearest[witness] as usize].nearest(cell.corner(witness)).point - center;
-        let (x, y, z) = (q.x as f32, q.y as f32, q.z as f32);
-        let mut farthest = 0.0f32;
-        for corner in 0..CORNERS {
-            let (x, y, z) = (offsets.x[corner] - x, offsets.y[corner] - y, offsets.z[corner] - z);
-            let distance = (x * x + y * y + z * z).sqrt() + 2.0 * error;
-            farthest = farthest.max(distance);
-            reach[witness][corner] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
-        }
-        upper = upper.min(farthest);
-    }
-    out.clear();
-    for (&triangle, row) in list.iter().zip(squared.iter()) {
-        let mut beaten = false;
-        for witness in &reach {
-            let mut farther = true;
-            for corner in 0..CORNERS {
-                farther &= row[corner] > witness[corner];
+fn refine_body<F: Fuse>(
+    tree: &Tree,
+    cells: &[Aabb],
+    list: &[Slot],
+    scratch: &mut Scratch,
+    out: &mut [Vec<Slot>; OCTANTS],
+) -> [Range; OCTANTS] {
+    // Slots beyond the cells that there are repeat the last.
+    let cell = |i: usize| &cells[i.min(cells.len() - 1)];
+    let around = cells.iter().fold(Aabb::EMPTY, |b, &c| b.union(c));
+    let center = around.center();
+    let offsets: [Offsets<LANES>; PAIRS] =
+        std::array::from_fn(|pair| Offsets::from_fn(|lane| cell(2 * pair + lane / CORNERS).corner(lane % CORNERS) - center));
+    let error = filter_error(tree, &around) as f32;
+    let pairs = cells.len().div_ceil(2);
+    let rows = &mut scratch.rows;
+    rows.clear();
+    let mut least = [[f32::INFINITY; LANES]; PAIRS];
+    // Position in the list, as a float so that both are chosen by one kind of instruction.
+    let mut nearest = [[0.0f32; LANES]; PAIRS];
+    for (position, &slot) in list.iter().enumerate() {
+        let (frame, position) = (tree.frame_at(slot), position as f32);
+        let mut row = [[0.0; LANES]; PAIRS];
+        for pair in 0..pairs {
+            frame.distances_squared::<F, LANES>(center, &offsets[pair], &mut row[pair]);
+            let (mut low, mut at) = (least[pair], nearest[pair]);
+            for lane in 0..LANES {
+                let nearer = row[pair][lane] < low[lane];
+                low[lane] = if nearer { row[pair][lane] } else { low[lane] };
+                at[lane] = if nearer { position } else { at[lane] };
             }
-            beaten |= farther;
+            (least[pair], nearest[pair]) = (low, at);
         }
-        if !beaten {
-            out.push(triangle);
+        rows.push(row);
+    }
+    let mut ranges = [Range::ALL; OCTANTS];
+    for pair in 0..pairs {
+        let offsets = &offsets[pair];
+        // Squared distances from every corner to every witness of its box, too large rather than too small by all errors.
+        let mut reach = [[0.0f32; LANES]; CORNERS];
+        let mut farthest = [[0.0f32; LANES]; CORNERS];
+        let witnesses = feet(tree, list, &nearest[pair], offsets, center);
+        for witness in 0..CORNERS {
+            let q = |axis: usize, lane: usize| witnesses[axis][lane / CORNERS * CORNERS + witness];
+            for lane in 0..LANES {
+                let (x, y, z) = (offsets.x[lane] - q(0, lane), offsets.y[lane] - q(1, lane), offsets.z[lane] - q(2, lane));
+                let distance = (x * x + y * y + z * z).sqrt() + 2.0 * error;
+                farthest[witness][lane] = distance;
+                reach[witness][lane] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
+            }
+        }
+        let [first, second] = [2 * pair, 2 * pair + 1];
+        let (left, right) = out.split_at_mut(second);
+        let (left, right) = (&mut left[first], &mut right[0]);
+        left.clear();
+        right.clear();
+        for (&slot, row) in list.iter().zip(rows.iter()) {
+            // A witness that is nearer than the triangle from all corners of a box leaves no bit of its half.
+            let (mut low, mut high) = (true, true);
+            for witness in &reach {
+                let mask = F::mask_not_above(&row[pair], witness);
+                low &= mask & 0xff != 0;
+                high &= mask & 0xff00 != 0;
+            }
+            if low {
+                left.push(slot);
+            }
+            if high {
+                right.push(slot);
+            }
+        }
+        for (half, octant) in [first, second].into_iter().enumerate() {
+            let lanes = half * CORNERS..(half + 1) * CORNERS;
+            let nearest = least[pair][lanes.clone()].iter().fold(f32::INFINITY, |a, &b| a.min(b)).sqrt();
+            let lower = f64::from(nearest) - f64::from(error) - cell(octant).radius();
+            let span = |far: &[f32; LANES]| far[lanes.clone()].iter().fold(0.0f32, |a, &b| a.max(b));
+            let upper = farthest.iter().map(span).fold(f32::INFINITY, f32::min);
+            ranges[octant] = Range { lower: lower.max(0.0), upper: f64::from(upper) };
         }
     }
-    let nearest = least.iter().fold(f32::INFINITY, |a, &b| a.min(b)).sqrt();
-    let lower = f64::from(nearest) - f64::from(error) - cell.radius();
-    Range { lower: lower.max(0.0), upper: f64::from(upper) }
+    ranges
+}
+
+/// The nearest points of the triangles at `positions` from `center + offsets`, relative to `center`.
+#[inline(always)]
+fn feet(tree: &Tree, list: &[Slot], positions: &[f32; LANES], offsets: &Offsets<LANES>, center: DVec3) -> [[f32; LANES]; 3] {
+    let facets: [Facet; LANES] = std::array::from_fn(|lane| *tree.facet_at(list[positions[lane] as usize]));
+    let mut out = [[0.0; LANES]; 3];
+    for lane in 0..LANES {
+        let p = center + DVec3::new(f64::from(offsets.x[lane]), f64::from(offsets.y[lane]), f64::from(offsets.z[lane]));
+        let (facet, foot) = (&facets[lane], facets[lane].foot(p));
+        let q = facet.a + facet.ab * foot.s + facet.ac * foot.t - center;
+        (out[0][lane], out[1][lane], out[2][lane]) = (q.x as f32, q.y as f32, q.z as f32);
+    }
+    out
 }

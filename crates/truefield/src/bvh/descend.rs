@@ -1,7 +1,7 @@
 //! Halving blocks of a lattice from coarse to fine, each with its complete list of candidates.
 
-use super::cover::{Range, Scratch, gather, refine};
-use super::tree::Tree;
+use super::cover::{OCTANTS, Range, Scratch, gather, refine};
+use super::tree::{Slot, Tree};
 use crate::error::Result;
 use crate::geom::Aabb;
 use crate::grid::Grid;
@@ -91,8 +91,8 @@ pub(crate) struct Visit<'a> {
     pub cell: Aabb,
     /// Bounds of the unsigned distance in the block.
     pub range: Range,
-    /// Every triangle that can be nearest somewhere in the block, ascending.
-    pub list: &'a [u32],
+    /// Every triangle that can be nearest somewhere in the block, ascending in the tree's order.
+    pub list: &'a [Slot],
 }
 
 /// What to do with a block.
@@ -112,7 +112,8 @@ pub(crate) struct Descent<'a> {
     pub lattice: &'a Grid,
     pub span: Span,
     scratch: Scratch,
-    lists: Vec<Vec<u32>>,
+    /// Lists that no block uses at present.
+    lists: Vec<[Vec<Slot>; OCTANTS]>,
 }
 
 impl<'a> Descent<'a> {
@@ -125,11 +126,9 @@ impl<'a> Descent<'a> {
     /// A tile where no distance in `window` can occur is shown with its range and no list.
     pub fn tile(&mut self, tile: Block, edge: i64, window: Range, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
         let cell = tile.extent(self.lattice, self.span);
-        let mut list = self.lists.pop().unwrap_or_default();
+        let mut list = Vec::new();
         let range = gather(self.tree, &cell, window, &mut self.scratch, &mut list);
-        let result = self.block(Visit { block: tile, cell, range, list: &list }, edge, visit);
-        self.lists.push(list);
-        result
+        self.block(Visit { block: tile, cell, range, list: &list }, edge, visit)
     }
 
     fn block(&mut self, at: Visit<'_>, edge: i64, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
@@ -138,18 +137,25 @@ impl<'a> Descent<'a> {
             return Ok(());
         }
         let half = edge / 2;
+        let mut blocks = [at.block; OCTANTS];
+        let mut cells = [at.cell; OCTANTS];
+        let mut count = 0;
         for block in at.block.halves(half) {
-            let cell = block.extent(self.lattice, self.span);
-            if step == Step::Share {
-                self.block(Visit { block, cell, ..at }, half, visit)?;
-                continue;
-            }
-            let mut list = self.lists.pop().unwrap_or_default();
-            let range = refine(self.tree, &cell, at.list, &mut self.scratch, &mut list);
-            let result = self.block(Visit { block, cell, range, list: &list }, half, visit);
-            self.lists.push(list);
-            result?;
+            (blocks[count], cells[count]) = (block, block.extent(self.lattice, self.span));
+            count += 1;
         }
+        if step == Step::Share {
+            for (&block, &cell) in blocks.iter().zip(&cells).take(count) {
+                self.block(Visit { block, cell, ..at }, half, visit)?;
+            }
+            return Ok(());
+        }
+        let mut lists = self.lists.pop().unwrap_or_default();
+        let ranges = refine(self.tree, &cells[..count], at.list, &mut self.scratch, &mut lists);
+        for i in 0..count {
+            self.block(Visit { block: blocks[i], cell: cells[i], range: ranges[i], list: &lists[i] }, half, visit)?;
+        }
+        self.lists.push(lists);
         Ok(())
     }
 }

@@ -7,7 +7,7 @@
 use super::cover::{Range, filter_error};
 use super::descend::Block;
 use super::frame::Offsets;
-use super::tree::Tree;
+use super::tree::{Slot, Tree};
 use crate::geom::{Aabb, DVec3};
 use crate::grid::Grid;
 use crate::simd::{Fuse, multiversion};
@@ -58,14 +58,14 @@ impl Answers {
 pub(crate) struct Rows(Vec<[[f32; LANES]; PARTS]>);
 
 multiversion!(
-    /// Nearest triangles of `points`, all inside `cell`, from its complete ascending list.
+    /// Nearest triangles of `points`, all inside `cell`, from its complete list.
     ///
     /// Points whose unsigned distance is certainly not in `window` may be left without an answer.
     pub(crate) fn evaluate(
         tree: &Tree,
         cell: &Aabb,
         points: &Points,
-        list: &[u32],
+        list: &[Slot],
         window: Range,
         rows: &mut Rows,
         out: &mut Answers,
@@ -73,7 +73,7 @@ multiversion!(
 );
 
 #[inline(always)]
-fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32], window: Range, rows: &mut Rows, out: &mut Answers) {
+fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slot], window: Range, rows: &mut Rows, out: &mut Answers) {
     *out = Answers::NONE;
     if let [only] = list {
         let every: [u8; BLOCK] = std::array::from_fn(|i| i as u8);
@@ -89,13 +89,13 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32
     let rows = &mut rows.0;
     rows.clear();
     let mut least = [[f32::INFINITY; LANES]; PARTS];
-    for &triangle in list {
-        let frame = &tree.frames[triangle as usize];
+    for &slot in list {
+        let frame = tree.frame_at(slot);
         let mut row = [[0.0; LANES]; PARTS];
         for part in 0..PARTS {
             frame.distances_squared::<F, LANES>(base, &offsets[part], &mut row[part]);
             for lane in 0..LANES {
-                least[part][lane] = least[part][lane].min(row[part][lane]);
+                least[part][lane] = if row[part][lane] < least[part][lane] { row[part][lane] } else { least[part][lane] };
             }
         }
         rows.push(row);
@@ -109,7 +109,7 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32
         let reach = reach * reach * (1.0 + 8.0 * f32::EPSILON);
         *lane = if (distance < low) | (distance > high) { -1.0 } else { reach };
     }
-    for (&triangle, row) in list.iter().zip(rows.iter()) {
+    for (&slot, row) in list.iter().zip(rows.iter()) {
         let mut chosen = [0u8; BLOCK + LANES];
         let mut count = 0;
         for part in 0..PARTS {
@@ -120,14 +120,14 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[u32
                 mask &= mask - 1;
             }
         }
-        exact(tree, points, triangle, &chosen[..count], out);
+        exact(tree, points, slot, &chosen[..count], out);
     }
 }
 
-/// Offers `triangle` to the chosen points; triangles come in ascending order, so ties keep the lowest.
+/// Offers a triangle to the chosen points; the lowest index keeps ties.
 #[inline(always)]
-fn exact(tree: &Tree, points: &Points, triangle: u32, chosen: &[u8], out: &mut Answers) {
-    let facet = tree.facets[triangle as usize];
+fn exact(tree: &Tree, points: &Points, slot: Slot, chosen: &[u8], out: &mut Answers) {
+    let (facet, triangle) = (*tree.facet_at(slot), tree.triangle(slot));
     for group in chosen.chunks(GROUP) {
         let mut p = [[0.0f64; GROUP]; 3];
         for lane in 0..GROUP {
@@ -140,7 +140,7 @@ fn exact(tree: &Tree, points: &Points, triangle: u32, chosen: &[u8], out: &mut A
         }
         for (lane, &i) in group.iter().enumerate() {
             let i = usize::from(i) % BLOCK;
-            if squared[lane] < out.squared[i] {
+            if squared[lane] < out.squared[i] || (squared[lane] == out.squared[i] && triangle < out.triangle[i]) {
                 out.squared[i] = squared[lane];
                 out.triangle[i] = triangle;
             }

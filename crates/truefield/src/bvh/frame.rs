@@ -83,27 +83,39 @@ impl Frame {
             let along = |start: f32, e: &[f32; 3]| F::mul_add(oz, e[2], F::mul_add(oy, e[1], F::mul_add(ox, e[0], start)));
             let (x, y, z) = (along(x0, &self.x), along(y0, &self.y), along(z0, &self.z));
             // First edge: on the x axis.
-            let t = x - x.max(0.0).min(self.length);
+            let t = x - clamp(x, self.length);
             let first = F::mul_add(t, t, y * y);
             // The others: along and across their unit direction.
             let (wx, [ex, ey]) = (x - self.length, self.second);
             let s = F::mul_add(wx, ex, y * ey);
-            let s = s - s.max(0.0).min(self.second_length);
+            let s = s - clamp(s, self.second_length);
             let across2 = F::mul_add(wx, ey, -(y * ex));
             let second = F::mul_add(s, s, across2 * across2);
             let [ex, ey] = self.third;
             let s = F::mul_add(x, ex, y * ey);
-            let s = s - s.max(0.0).min(self.third_length);
+            let s = s - clamp(s, self.third_length);
             let across3 = F::mul_add(x, ey, -(y * ex));
             let third = F::mul_add(s, s, across3 * across3);
             // Inside: above the first edge, left of the second, right of the third; strictly, since a segment has its own
             // line on the right side of all three.
             let inside = (y > 0.0) & (across2 < 0.0) & (across3 > 0.0);
-            let plane = first.min(second).min(third);
+            let plane = least(least(first, second), third);
             let plane = if inside { 0.0 } else { plane };
             out[lane] = F::mul_add(z, z, plane);
         }
     }
+}
+
+/// `x` brought into 0 ..= `high`; plain comparisons are one instruction, `f32::clamp` minds NaN with five.
+#[inline(always)]
+fn clamp(x: f32, high: f32) -> f32 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    if x < high { x } else { high }
+}
+
+#[inline(always)]
+fn least(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
 }
 
 #[cfg(test)]
@@ -111,9 +123,19 @@ mod tests {
     use super::*;
     use crate::geom::Facet;
     use crate::laws::Random;
-    use crate::simd::{Fused, Plain};
+    use crate::simd::{Plain, multiversion};
 
     const LANES: usize = 16;
+
+    multiversion!(
+        /// What this machine runs.
+        fn native(frame: &Frame, base: DVec3, offsets: &Offsets<LANES>, out: &mut [f32; LANES]) = native_body
+    );
+
+    #[inline(always)]
+    fn native_body<F: Fuse>(frame: &Frame, base: DVec3, offsets: &Offsets<LANES>, out: &mut [f32; LANES]) {
+        frame.distances_squared::<F, LANES>(base, offsets, out);
+    }
 
     /// Slivers, segments, points and others, some of them along the axes.
     fn corners(random: &mut Random) -> [DVec3; 3] {
@@ -150,13 +172,13 @@ mod tests {
                 _ => toward + DVec3::AXES[random.below(3)] * random.between(-1.0, 1.0),
             });
             let offsets = Offsets::<LANES>::from_fn(|lane| offset[lane]);
-            let (mut plain, mut fused) = ([0.0; LANES], [0.0; LANES]);
+            let (mut plain, mut quick) = ([0.0; LANES], [0.0; LANES]);
             frame.distances_squared::<Plain, LANES>(base, &offsets, &mut plain);
-            frame.distances_squared::<Fused, LANES>(base, &offsets, &mut fused);
+            native(&frame, base, &offsets, &mut quick);
             for lane in 0..LANES {
                 let truth = facet.distance_squared(base + offset[lane]).sqrt();
                 let size = base.length() + offset[lane].length() + 3.0;
-                for found in [plain[lane], fused[lane]] {
+                for found in [plain[lane], quick[lane]] {
                     let error = (f64::from(found.sqrt()) - truth).abs() / size;
                     assert!(error <= FILTER_ERROR, "{corners:?} at {:?}: {} instead of {truth}", base + offset[lane], found.sqrt());
                     worst = worst.max(error);

@@ -10,7 +10,7 @@ pub(crate) mod intersect;
 mod nearest;
 mod order;
 mod ray;
-mod tree;
+pub(crate) mod tree;
 pub mod winding;
 
 pub use nearest::Candidate;

@@ -1,7 +1,7 @@
 //! Nearest triangle of one point and of many.
 
 use super::order::Order;
-use super::tree::{ABSENT, LEAF, Packet, Tree, WIDTH};
+use super::tree::{ABSENT, LEAF, Packet, Slot, Tree, WIDTH};
 use crate::error::Result;
 use crate::geom::DVec3;
 use crate::run::Run;
@@ -71,13 +71,13 @@ multiversion!(fn search_many(tree: &Tree, points: &[DVec3], order: &[u32], out: 
 
 #[inline(always)]
 fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], order: &[u32], out: &mut [Candidate]) {
-    let mut warm = 0;
+    let mut warm = Slot(0);
     for (&index, out) in order.iter().zip(out) {
         let p = points[index as usize];
-        let start = Candidate { distance_squared: tree.facets[warm].distance_squared(p), triangle: warm as u32 };
+        let start = Candidate { distance_squared: tree.facet_at(warm).distance_squared(p), triangle: tree.triangle(warm) };
         *out = search_body::<F>(tree, p, start);
         if out.found() {
-            warm = out.triangle as usize;
+            warm = tree.slots[out.triangle as usize];
         }
     }
 }

@@ -33,7 +33,14 @@ pub(crate) struct Packet {
     pub inverse: [[f64; WIDTH]; 3],
     pub slope: [f64; WIDTH],
     pub triangle: [u32; WIDTH],
+    /// The slots of the facets: `first .. first + count`.
+    pub first: u32,
+    pub count: u32,
 }
+
+/// A triangle's place in the tree's own order, in which neighbours in space are neighbours in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct Slot(pub u32);
 
 impl Packet {
     #[inline(always)]
@@ -58,10 +65,14 @@ impl Packet {
 pub struct Tree {
     pub(crate) nodes: Vec<Node>,
     pub(crate) packets: Vec<Packet>,
-    /// By triangle index.
+    /// By slot.
     pub(crate) facets: Vec<Facet>,
-    /// By triangle index.
+    /// By slot.
     pub(crate) frames: Vec<Frame>,
+    /// Triangle of every slot.
+    pub(crate) triangles: Vec<u32>,
+    /// Slot of every triangle.
+    pub(crate) slots: Vec<Slot>,
     pub(crate) extent: Aabb,
     pub(crate) center: DVec3,
     /// Radius of the ball around the extent.
@@ -86,6 +97,21 @@ impl Tree {
 
     /// A triangle prepared for nearest-point queries.
     pub fn facet(&self, triangle: u32) -> &Facet {
-        &self.facets[triangle as usize]
+        self.facet_at(self.slots[triangle as usize])
+    }
+
+    #[inline(always)]
+    pub(crate) fn facet_at(&self, slot: Slot) -> &Facet {
+        &self.facets[slot.0 as usize]
+    }
+
+    #[inline(always)]
+    pub(crate) fn frame_at(&self, slot: Slot) -> &Frame {
+        &self.frames[slot.0 as usize]
+    }
+
+    #[inline(always)]
+    pub(crate) fn triangle(&self, slot: Slot) -> u32 {
+        self.triangles[slot.0 as usize]
     }
 }
