@@ -21,6 +21,8 @@ __all__ = [
     "complete_field_from_parts",
     "complete_field_parts",
     "contour",
+    "thickness",
+    "walls_at",
 ]
 
 __version__: str
