@@ -16,6 +16,7 @@ from test_io import BAD_FILES
 LINES = {
     "thickness": ["thickness", "{part}", "--above", "0.5", "--tolerance", "0.1", "--output", "{folder}/report"],
     "contour": ["contour", "{part}", "--depth", "0.2", "--tolerance", "0.1", "-o", "{folder}/out.ply"],
+    "field": ["field", "{part}", "--resolution", "4", "-o", "{folder}/out.tfield"],
     "info": ["info", "{part}"],
     "distance": ["distance", "{part}", "--points", "{points}", "-o", "{folder}/out.csv"],
 }

@@ -8,6 +8,7 @@ import typer
 
 from truefield.cli.contour import contour
 from truefield.cli.distance import distance
+from truefield.cli.field import field
 from truefield.cli.info import info
 from truefield.cli.thickness import thickness
 
@@ -19,7 +20,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (info, thickness, contour, distance):
+for command in (info, thickness, contour, distance, field):
     app.command()(command)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Part, Sign, SignRule, Threads, Weld, load
+from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, ready
 from truefield.cli.progress import progress
 
 
@@ -20,7 +20,7 @@ class Placement(str, Enum):
 
 
 def contour(
-    part: Part,
+    part: Askable,
     *,
     depth: Annotated[
         float,
@@ -52,9 +52,8 @@ def contour(
 
     table.check(output)
     files.check_file(output)
-    mesh = load(part, weld)
     with progress() as report:
-        surface = tf.Surface(mesh, sign=sign.value, threads=threads, progress=report)
+        surface = ready(part, weld, sign, threads, report)
         cloud = surface.contour(-depth, tolerance, placement=placement.value, threads=threads, progress=report)
     if len(cloud) == 0:
         place = "inside" if depth > 0 else "outside"

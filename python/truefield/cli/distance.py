@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Part, Sign, SignRule, Threads, Weld, load
+from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, ready
 from truefield.cli.progress import progress
 
 
 def distance(
-    part: Part,
+    part: Askable,
     *,
     points: Annotated[
         Path,
@@ -39,11 +39,10 @@ def distance(
     table.check(output)
     files.check_file(output)
     asked = tf.read_points(points)
-    mesh = load(part, weld)
     with progress() as report:
-        surface = tf.Surface(mesh, sign=sign.value, threads=threads, progress=report)
-        nearest = surface.nearest(asked)
-        lower, upper = surface.bounds(asked)
+        surface = ready(part, weld, sign, threads, report)
+        nearest = surface.nearest(asked, threads=threads, progress=report)
+        lower, upper = surface.bounds(asked, threads=threads, progress=report)
     columns = dict(zip("xyz", asked.T, strict=True))
     columns |= {"distance": nearest.distance, "lower": lower, "upper": upper}
     columns |= dict(zip(("nearest_x", "nearest_y", "nearest_z"), nearest.point.T, strict=True))

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from truefield.cli.progress import Report
+
 if TYPE_CHECKING:
+    from truefield.fields import CompleteField, Surface
     from truefield.mesh import TriangleMesh
+
+FIELD_SUFFIX: Final = ".tfield"
 
 
 class Sign(str, Enum):
@@ -40,6 +45,30 @@ Weld = Annotated[
         help="Join vertices whose coordinates differ by no more than this, as an STL with cracks may need.",
     ),
 ]
+
+
+Askable = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PART",
+        show_default=False,
+        help="A mesh: .stl, .obj, .ply, .off, .glb, .gltf or .3mf; or a field: .tfield.",
+    ),
+]
+
+
+def ready(
+    part: Path, weld: float | None, sign: Sign, threads: int | None, report: Report | None
+) -> Surface | CompleteField:
+    """The part ready to be asked: the field in a `.tfield`, the surface of a mesh in any other file."""
+    import truefield as tf
+
+    if part.suffix.lower() != FIELD_SUFFIX:
+        return tf.Surface(load(part, weld), sign=sign.value, threads=threads, progress=report)
+    if weld is not None or sign is not Sign.AUTO:
+        option = "--sign" if weld is None else "--weld"
+        raise tf.TruefieldError(f"'{part}' is a field, built with its own mesh and sign rule; leave {option} out")
+    return tf.load(part, threads=threads, progress=report)
 
 
 def load(part: Path, weld: float | None) -> TriangleMesh:
