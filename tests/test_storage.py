@@ -152,6 +152,13 @@ def test_progress_goes_from_phase_to_phase(tmp_path: Path) -> None:
     assert all(0.0 <= fraction <= 1.0 for _, fraction in told)
 
 
+def test_a_wrong_argument_is_not_blamed_on_the_file(saved: bytes, tmp_path: Path) -> None:
+    (tmp_path / "good.tfield").write_bytes(saved)
+    with pytest.raises(tf.TruefieldError, match="threads must be at least 1") as caught:
+        tf.load(tmp_path / "good.tfield", threads=0)
+    assert not isinstance(caught.value, tf.FileError)
+
+
 def test_every_damaged_byte_is_noticed(saved: bytes, tmp_path: Path) -> None:
     generator = np.random.default_rng(11)
     header_end = START.size + START.unpack_from(saved)[2] + 32

@@ -105,6 +105,9 @@ def load(path: PathLike, *, threads: int | None = None, progress: Progress | Non
     Raises:
         FileError: the file cannot be read, is no such field, truncated, damaged, or from a newer truefield.
     """
+    # Later on, the file would be blamed.
+    if threads is not None and threads < 1:
+        raise TruefieldError(f"threads must be at least 1, or None for all cores, not {threads}")
     file = Path(path)
     try:
         with file.open("rb") as stream:
