@@ -223,6 +223,8 @@ class ThicknessReport:
             f"The greatest wall thickness is between {greatest.lower:.6g} and {greatest.upper:.6g}, "
             f"at {_place(self.greatest_depth.point)}."
         ]
+        if greatest.upper - greatest.lower > 2.0 * self.tolerance:
+            says.append("It is not known to the tolerance, because the holes of the mesh leave sides in doubt.")
         if self.heavy is not None and self.above is not None:
             count = len(self.heavy.sections)
             if greatest.upper <= self.above:

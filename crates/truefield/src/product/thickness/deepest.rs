@@ -11,8 +11,9 @@ use crate::run::Run;
 /// Cells taken per round; each round is spread over all threads, so the result does not depend on them.
 const ROUND: usize = 1024;
 
-/// Cells looked at before the search ends with a wider interval: only where the side is doubtful all over.
-const BUDGET: usize = 20_000_000;
+/// Cells looked at before the search ends with a wider interval: reached only where sides are
+/// doubtful all over, as around the holes of an open mesh.
+const BUDGET: usize = 4_000_000;
 
 /// The deepest place of a region and what is certain about its depth.
 #[derive(Clone, Copy, Debug, PartialEq)]

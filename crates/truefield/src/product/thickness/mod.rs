@@ -160,7 +160,8 @@ fn measure(
     })
 }
 
-/// The deepest place of the part; the depth interval is no wider than `tolerance`.
+/// The deepest place of the part; the depth interval is no wider than `tolerance`, except on an
+/// open mesh whose holes leave the side of deep places doubtful.
 ///
 /// Branch and bound with bounds of second order in the cell size: some thousand distance queries
 /// for most parts. Fails if `tolerance` is not a positive length above rounding, or if the part
