@@ -82,7 +82,7 @@ fn complete_fields_equal_their_surface_everywhere() {
             let extent = nasty.mesh.extent();
             let margin = [0.0, 0.1, 0.5][round] * extent.diagonal();
             let grid = Grid::over(&extent.grow(margin), resolution).expect("a grid");
-            let points = cell_places(&nasty.mesh, &grid, 2_000, u64::from(resolution));
+            let points = cell_places(&nasty.mesh, &grid, 800, u64::from(resolution));
             for region in [Region::Everywhere, Region::Inside] {
                 let field = complete(&surface, &grid, region, PLENTY, &two()).unwrap_or_else(|error| panic!("{}: {error}", nasty.name));
                 same(nasty.name, &field, &surface, &points, &format!("{resolution} cells, {region:?}"));
@@ -96,7 +96,7 @@ fn a_small_budget_costs_time_and_nothing_else() {
     for nasty in corpus().into_iter().filter(|nasty| nasty.mesh.triangles().len() > 100) {
         let surface = surface(&nasty.mesh, SignChoice::Auto);
         let grid = Grid::over(&nasty.mesh.extent().grow(0.2 * nasty.mesh.extent().diagonal()), 20).expect("a grid");
-        let points = cell_places(&nasty.mesh, &grid, 1_000, 8);
+        let points = cell_places(&nasty.mesh, &grid, 500, 8);
         let full = complete(&surface, &grid, Region::Everywhere, PLENTY, &two()).expect("a field").statistics().bytes;
         for share in [0.9, 0.5, 0.2, 0.01] {
             let budget = (full as f64 * share) as u64;
@@ -140,7 +140,7 @@ fn complete_fields_of_large_meshes_equal_their_surface() {
         let surface = surface(&mesh, SignChoice::Auto);
         let grid = Grid::over(&mesh.extent().grow(0.02 * mesh.extent().diagonal()), resolution).expect("a grid");
         let field = complete(&surface, &grid, Region::Everywhere, PLENTY, &two()).expect("a field");
-        same("a large mesh", &field, &surface, &cell_places(&mesh, &grid, 60_000, 4), "everywhere");
+        same("a large mesh", &field, &surface, &cell_places(&mesh, &grid, 20_000, 4), "everywhere");
     }
 }
 
@@ -198,7 +198,7 @@ fn samples_enclose_the_truth() {
     for nasty in corpus() {
         let (surface, brute) = (surface(&nasty.mesh, SignChoice::Auto), BruteForce::new(&nasty.mesh));
         let size = nasty.mesh.extent().diagonal();
-        for (resolution, band) in [(3, None), (21, None), (21, Some(0.07)), (21, Some(0.3)), (12, Some(1e-3)), (12, Some(1e3))] {
+        for (resolution, band) in [(3, None), (19, None), (14, Some(0.07)), (12, Some(0.3)), (9, Some(1e-3)), (7, Some(1e3))] {
             let lattice = Grid::over(&nasty.mesh.extent().grow(0.15 * size), resolution).expect("a lattice");
             let field = sample(&surface, &lattice, band.map(|b| b * size), PLENTY, &two())
                 .unwrap_or_else(|error| panic!("{}: {error}", nasty.name));
