@@ -368,3 +368,36 @@ def test_arguments_that_cannot_be_are_refused() -> None:
         tf.complete_field(mesh, 4, region="outside")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="TriangleMesh"):
         tf.Surface([[0, 0, 0]])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["cube", "torus", "soup"])
+@pytest.mark.parametrize("distance", [-0.1, 0.15])
+@pytest.mark.parametrize("placement", ["lattice", "projected"])
+def test_contours_keep_both_guarantees(name: str, distance: float, placement: tf.fields.Placement) -> None:
+    mesh, tolerance = ALL[name], 0.06
+    surface = tf.Surface(mesh, "auto" if name in CLOSED else "unsigned")
+    distance = distance if name in CLOSED else abs(distance)
+    cloud = surface.contour(distance, tolerance, placement=placement)
+    of_field = tf.complete_field(surface, 8).contour(distance, tolerance, placement=placement)
+    np.testing.assert_array_equal(of_field.points, cloud.points)
+
+    def truth(points: Floats) -> Floats:
+        unsigned = judged(mesh, points).min(axis=1)
+        inside = (name in CLOSED) & (winding_number(points, mesh.corners) > 0.5)
+        return np.asarray(np.where(inside, -unsigned, unsigned))
+
+    assert cloud.normals is not None
+    assert cloud.triangle is not None
+    some = np.random.default_rng(8).choice(len(cloud.points), min(400, len(cloud.points)), replace=False)
+    assert np.all(np.abs(truth(cloud.points[some]) - distance) <= tolerance / 2 + 1e-12)
+    np.testing.assert_allclose(np.linalg.norm(cloud.normals, axis=1), 1.0, atol=1e-9)
+    nearest = judged(mesh, cloud.points[some])
+    own = nearest[np.arange(len(some)), cloud.triangle[some]]
+    np.testing.assert_allclose(own, nearest.min(axis=1), atol=1e-12)
+    starts = places(mesh, count=200, seed=9)
+    hit = surface.nearest(starts)
+    on_it = hit.point + hit.normal * distance
+    on_it = on_it[np.abs(truth(on_it) - distance) <= 1e-12]
+    assert len(on_it) > 50
+    apart = np.array([np.linalg.norm(cloud.points - p, axis=1).min() for p in on_it])
+    assert np.all(apart <= (0.5 if placement == "lattice" else 1.0) * tolerance + 1e-12)
