@@ -84,6 +84,14 @@ def test_interval_spans_zero_where_the_side_is_unknown(part: tf.TriangleMesh) ->
     assert (lower[0], upper[0]) == (-2.0, 2.0)
 
 
+def test_wall_thickness_is_twice_the_depth(part: tf.TriangleMesh) -> None:
+    heavy = tf.thickness(part, tolerance=0.01, above=1.9)
+    assert heavy.greatest_depth.depth.lower <= 1.0 <= heavy.greatest_depth.depth.upper
+    assert heavy.greatest_thickness.lower <= 2.0 <= heavy.greatest_thickness.upper
+    assert len(heavy.heavy_sections) == 1
+    assert not tf.thickness(part, tolerance=0.01, above=2.1).heavy_sections
+
+
 def test_contours_outside_are_positive(part: tf.TriangleMesh) -> None:
     field = tf.complete_field(part, resolution=12)
     for level in (-0.5, 0.5):
