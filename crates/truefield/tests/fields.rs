@@ -327,3 +327,27 @@ fn what_cannot_be_built_is_said() {
     assert_eq!(Aabb::around([DVec3::ZERO, DVec3::ONE]), extent);
     assert_eq!(field.at(DVec3::splat(0.5)), Interval::exact(-0.5));
 }
+
+#[test]
+fn parts_put_together_again_are_the_field() {
+    for nasty in corpus().into_iter().step_by(4) {
+        let surface = surface(&nasty.mesh, SignChoice::Auto);
+        let whole = Grid::over(&nasty.mesh.extent().grow(0.1 * nasty.mesh.extent().diagonal()), 20).expect("a grid");
+        for first in [[0; 3], [3, -9, 5]] {
+            let grid = Grid { first, ..whole };
+            for region in [Region::Everywhere, Region::Inside] {
+                let field = complete(&surface, &grid, region, PLENTY, &two()).expect("a field");
+                let parts = field.to_parts(&two()).expect("parts");
+                let again = CompleteField::from_parts(Arc::clone(&surface), grid, region, &parts, &two()).expect("the field again");
+                assert_eq!(again.statistics(), field.statistics(), "{}", nasty.name);
+                let points = cell_places(&nasty.mesh, &grid, 400, 16);
+                let bits = |field: &CompleteField| {
+                    let bounds = field.bounds(&points, &two()).expect("answers");
+                    bounds.iter().map(|b| [b.lower.to_bits(), b.upper.to_bits()]).collect::<Vec<_>>()
+                };
+                assert_eq!(bits(&again), bits(&field), "{}", nasty.name);
+                same(nasty.name, &again, &surface, &points, "put together again");
+            }
+        }
+    }
+}
