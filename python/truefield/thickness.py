@@ -145,8 +145,9 @@ class WallSamples:
         triangle: (n,) int64.
         area: (n,) float64 surface area that the sample stands for.
         kind: (n,) uint8. 0 wall: the ball touches walls that oppose each other. 1 edge: it sits in a convex edge, held
-            by two walls that meet just beyond it, and tells how near that edge is. 2 inner: not between inside and
-            outside, as a face inside the material.
+            by two walls that meet just beyond it, and tells how near that edge is; also balls no larger than the
+            tolerance, as in folds and needles of the mesh. 2 inner: not between inside and outside, as a face inside
+            the material.
         thickness_sphere: (n,) float64 diameter of the inscribed ball that touches there; NaN on inner faces.
         thickness_ray: (n,) float64 way along the inward normal to the next wall; NaN on inner faces and without a hit.
         slack: (n,) float64; the ball may stay this far from the wall, which is what the facets of a curved wall stray
@@ -335,7 +336,7 @@ class ThicknessReport:
                 "sphere": _statistics(walls.sphere),
                 "ray": _statistics(walls.ray),
                 "near_sharp_edges": asdict(walls.edge)
-                | {"treatment": "the ball is held by two walls of a convex edge: counted here, left out of sphere"},
+                | {"treatment": "held by two walls of a convex edge, or smaller than the tolerance: not in sphere"},
                 "inner_faces": asdict(walls.inner),
                 "rays_without_hit": walls.missed,
                 "slack": walls.slack,

@@ -88,7 +88,8 @@ pub fn thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Result<
     let octree = Octree::new(surface);
     let greatest = deepest_place(surface, &octree, tolerance, run)?;
     let heavy = above.map(|above| sections::sections(&octree, 0.5 * above, tolerance, run)).transpose()?;
-    let walls = measure(surface, &sampler, octree.rounding, greatest.depth.upper, (above, below), run)?;
+    let gauge = Gauge::new(surface, octree.rounding, tolerance, greatest.depth.upper);
+    let walls = measure(&gauge, &sampler, (above, below), run)?;
     Ok(Thickness { greatest, heavy, walls })
 }
 
@@ -106,7 +107,8 @@ pub fn wall_thickness(surface: &Surface, options: &Options, run: &Run<'_>) -> Re
     let sampler = Sampler::new(surface.mesh(), spacing, tolerance)?;
     let octree = Octree::new(surface);
     let greatest = deepest_place(surface, &octree, tolerance, run)?;
-    measure(surface, &sampler, octree.rounding, greatest.depth.upper, (above, below), run)
+    let gauge = Gauge::new(surface, octree.rounding, tolerance, greatest.depth.upper);
+    measure(&gauge, &sampler, (above, below), run)
 }
 
 /// The walls at given points of triangles, measured as [`wall_thickness`] does.
@@ -120,7 +122,7 @@ pub fn walls_at(surface: &Surface, places: &[(DVec3, u32)], tolerance: f64, larg
     check_tolerance(surface, tolerance)?;
     check_limit("largest", largest)?;
     let sampler = Sampler::new(surface.mesh(), None, tolerance)?;
-    let gauge = Gauge::new(surface, cells::rounding(&surface.mesh().extent()), largest);
+    let gauge = Gauge::new(surface, cells::rounding(&surface.mesh().extent()), tolerance, largest);
     let blocks = run.blocks("wall thickness", places.len().div_ceil(CHUNK), |block| {
         let places = &places[block * CHUNK..places.len().min((block + 1) * CHUNK)];
         Ok(places.iter().map(|&(p, t)| gauge.sample(&sampler.at(p, t))).collect::<Vec<_>>())
@@ -128,15 +130,7 @@ pub fn walls_at(surface: &Surface, places: &[(DVec3, u32)], tolerance: f64, larg
     Ok(blocks.concat())
 }
 
-fn measure(
-    surface: &Surface,
-    sampler: &Sampler<'_>,
-    rounding: f64,
-    largest: f64,
-    (above, below): (Option<f64>, Option<f64>),
-    run: &Run<'_>,
-) -> Result<Walls> {
-    let gauge = Gauge::new(surface, rounding, largest);
+fn measure(gauge: &Gauge<'_>, sampler: &Sampler<'_>, (above, below): (Option<f64>, Option<f64>), run: &Run<'_>) -> Result<Walls> {
     let count = sampler.len();
     let blocks = run.blocks("wall thickness", count.div_ceil(CHUNK), |block| {
         let places = sampler.places(block * CHUNK, count.min((block + 1) * CHUNK));

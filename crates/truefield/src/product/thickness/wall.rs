@@ -23,7 +23,8 @@ pub enum Kind {
     /// On a wall: the ball spans from this wall to one that opposes it.
     Wall,
     /// In a convex edge: the ball is held by two walls that meet just beyond it, so its diameter
-    /// tells how near the edge is and not how thick the wall is.
+    /// tells how near the edge is and not how thick the wall is. Also where the ball is smaller than
+    /// the tolerance: such folds and needles are no walls.
     Edge,
     /// Not between inside and outside: a face inside the material, or a sheet without thickness.
     Inner,
@@ -70,6 +71,8 @@ pub(super) struct Gauge<'a> {
     oriented: bool,
     /// Distance at which the two sides of the surface are told apart.
     aside: f64,
+    /// Balls no larger across than this are not taken for walls.
+    tolerance: f64,
     /// No inscribed ball has a larger radius.
     largest: f64,
 }
@@ -84,10 +87,10 @@ struct Ball {
 
 impl<'a> Gauge<'a> {
     /// `largest` is an upper bound of the part's greatest depth.
-    pub fn new(surface: &'a Surface, rounding: f64, largest: f64) -> Self {
+    pub fn new(surface: &'a Surface, rounding: f64, tolerance: f64, largest: f64) -> Self {
         let aside = (1e-7 * surface.mesh().extent().diagonal()).max(100.0 * rounding);
         let oriented = surface.sign_rule().kind == SignKind::Pseudonormal;
-        Self { surface, rounding, oriented, aside, largest }
+        Self { surface, rounding, oriented, aside, tolerance, largest }
     }
 
     pub fn sample(&self, place: &Place) -> Sample {
@@ -102,7 +105,8 @@ impl<'a> Gauge<'a> {
         let inward = if behind { -normal } else { normal };
         let ray = self.ray(point, inward, triangle);
         let ball = self.ball(point, inward, slack, ray);
-        let kind = if self.in_edge(point, inward, slack, &ball) { Kind::Edge } else { Kind::Wall };
+        let tiny = 2.0 * ball.radius <= self.tolerance;
+        let kind = if tiny || self.in_edge(point, inward, slack, &ball) { Kind::Edge } else { Kind::Wall };
         let sphere = Some(Across { thickness: 2.0 * ball.radius, opposite: ball.held, triangle: ball.triangle });
         Sample { normal: -inward, kind, sphere, ray, ..sample }
     }
