@@ -57,7 +57,7 @@ clean: ## remove everything that was built or fetched
 $(VENV)/.tools:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || { \
 	  echo "error: '$(PYTHON)' is missing or older than Python 3.10; install one, or name it: make PYTHON=/path/to/python" >&2; exit 1; }
-	@command -v cargo >/dev/null || { echo "error: cargo is missing; install a Rust toolchain (1.88 or newer) first" >&2; exit 1; }
+	@command -v cargo >/dev/null || { echo "error: cargo is missing; install a Rust toolchain (1.89 or newer) first" >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
 	  echo "error: '$(PYTHON) -m venv' failed; some systems ship it as a separate package (python3-venv)" >&2; exit 1; }
 	$(BIN)/python -m pip install --quiet 'maturin>=1.7,<2'

@@ -50,32 +50,108 @@ impl<'a> Sides<'a> {
 
     /// The side of every point of a block of a lattice of points, asking only where no neighbour can tell.
     pub fn of_points(&self, block: &Block, spacing: f64, points: &Points, answers: &Answers) -> [Side; BLOCK] {
-        let mut sides = [Side::Outside; BLOCK];
-        let distance: [f64; BLOCK] = std::array::from_fn(|i| answers.squared[i].sqrt());
-        let hand_on = self.surface.side_changes_at_surface_only();
-        // Two balls that overlap leave no room for the surface between their centres, however both were rounded.
+        // Rounding of coordinates, however two balls were rounded.
         let tree = self.surface.tree();
         let reach = points.x[0].abs().max(points.y[0].abs()).max(points.z[0].abs())
             + tree.extent.max.abs().max(tree.extent.min.abs()).max_element();
-        let step = spacing * (1.0 + 1e-9) + 64.0 * f64::EPSILON * reach;
-        for (i, local) in slots(block) {
-            if answers.triangle[i] == u32::MAX {
+        let slack = 64.0 * f64::EPSILON * reach;
+        let mut flood = Flood {
+            size: std::array::from_fn(|axis| block.high[axis] - block.low[axis]),
+            distance: std::array::from_fn(|i| answers.squared[i].sqrt()),
+            steps: [1.0f64, 2.0, 3.0].map(|squared| squared.sqrt() * spacing * (1.0 + 1e-9) + slack),
+            sides: [None; BLOCK],
+            carries: [0.0; BLOCK],
+        };
+        // The longest path through a block is asked for.
+        let longest = 10.0 * spacing;
+        let mut order: [(f64, u8); BLOCK] = std::array::from_fn(|i| (flood.distance[i], i as u8));
+        order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let mut held = [false; BLOCK];
+        for (i, _) in slots(block) {
+            held[i] = answers.triangle[i] != u32::MAX;
+        }
+        for i in order.map(|(_, i)| usize::from(i)) {
+            if !held[i] || flood.sides[i].is_some() {
                 continue;
             }
-            let told = [(local[2] > 0, 1), (local[1] > 0, 4), (local[0] > 0, 16)].into_iter().find(|&(exists, back)| {
-                let asked = |j: usize| answers.triangle[j] != u32::MAX && sides[j].is_certain();
-                hand_on && exists && asked(i - back) && distance[i] + distance[i - back] > step
-            });
-            sides[i] = match told {
-                Some((_, back)) => sides[i - back],
-                None => {
-                    let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
-                    let triangle = answers.triangle[i];
-                    self.surface.side(p, &tree.facet(triangle).nearest(p), triangle)
-                }
-            };
+            if !flood.take_over(i) {
+                let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
+                let triangle = answers.triangle[i];
+                let (side, carry) = self.surface.steady(p, &tree.facet(triangle).nearest(p), triangle, longest);
+                (flood.sides[i], flood.carries[i]) = (Some(side), if side.is_certain() { carry } else { 0.0 });
+            }
+            flood.hand_on(i, &held);
         }
-        sides
+        flood.sides.map(|side| side.unwrap_or(Side::Outside))
+    }
+}
+
+/// Sides spreading over a block: two balls that overlap leave no room for the surface between their centres.
+struct Flood {
+    size: [i64; 3],
+    distance: [f64; BLOCK],
+    /// Lengths of steps along one, two and three axes, with room for rounding.
+    steps: [f64; 3],
+    sides: [Option<Side>; BLOCK],
+    /// How far each side carries along paths off the surface.
+    carries: [f64; BLOCK],
+}
+
+impl Flood {
+    fn place(i: usize) -> [i64; 3] {
+        [i >> 4, i >> 2 & 3, i & 3].map(|x| x as i64)
+    }
+
+    /// The slot `step` away, if it is in the block.
+    fn neighbour(&self, place: [i64; 3], step: [i64; 3]) -> Option<usize> {
+        let at: [i64; 3] = std::array::from_fn(|axis| place[axis] + step[axis]);
+        (0..3).all(|axis| (0..self.size[axis]).contains(&at[axis])).then(|| (at[0] * 16 + at[1] * 4 + at[2]) as usize)
+    }
+
+    /// Gives slot `to` the side of slot `from`, `length` away, if the way there is clear.
+    fn copy(&mut self, from: usize, to: usize, length: f64) -> bool {
+        let clear = self.sides[from].is_some() && self.carries[from] >= length && self.distance[from] + self.distance[to] > length;
+        if clear {
+            (self.sides[to], self.carries[to]) = (self.sides[from], self.carries[from] - length);
+        }
+        clear
+    }
+
+    /// Takes a side over from any of the 26 neighbours.
+    fn take_over(&mut self, to: usize) -> bool {
+        let place = Self::place(to);
+        for step in (0..27).map(|n| [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1]) {
+            let axes = step.iter().filter(|&&x| x != 0).count();
+            if axes == 0 {
+                continue;
+            }
+            if let Some(from) = self.neighbour(place, step)
+                && self.copy(from, to, self.steps[axes - 1])
+            {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Hands a side on along the axes, as far as it goes.
+    fn hand_on(&mut self, from: usize, held: &[bool; BLOCK]) {
+        const AXES: [[i64; 3]; 6] = [[0, 0, 1], [0, 0, -1], [0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]];
+        let mut stack = [0u8; BLOCK];
+        stack[0] = from as u8;
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let from = usize::from(stack[height]);
+            let place = Self::place(from);
+            for step in AXES {
+                let Some(to) = self.neighbour(place, step) else { continue };
+                if held[to] && self.sides[to].is_none() && self.copy(from, to, self.steps[0]) {
+                    stack[height] = to as u8;
+                    height += 1;
+                }
+            }
+        }
     }
 }
 

@@ -62,6 +62,11 @@ impl Topology {
         self.sides.chunk_by(|a, b| a.ends == b.ends)
     }
 
+    /// Whether every edge is run along as often one way as the other.
+    pub fn is_closed(&self) -> bool {
+        self.edges().all(|sides| 2 * sides.iter().filter(|side| side.forward).count() == sides.len())
+    }
+
     /// Groups of two or more triangles over the same corners.
     pub fn copies(&self) -> Vec<Copies> {
         let mut keys: Vec<([u32; 3], u32)> =

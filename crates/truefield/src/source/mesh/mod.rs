@@ -81,6 +81,11 @@ impl Surface {
         self.signs.side_of_ball(&self.work, p, nearest, triangle, radius)
     }
 
+    /// The side of `p` and how far it carries off the surface, in the tree's units: see `Signs::steady`.
+    pub(crate) fn steady(&self, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> (Side, f64) {
+        self.signs.steady(&self.work, p, nearest, triangle, radius)
+    }
+
     /// Whether two points joined by a path off the surface are always on the same side.
     pub(crate) fn side_changes_at_surface_only(&self) -> bool {
         self.signs.changes_at_surface_only()

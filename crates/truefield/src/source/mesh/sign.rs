@@ -91,6 +91,8 @@ pub(crate) struct Signs {
     winding: Option<Sum>,
     /// Whether nothing but the surface parts inside from outside.
     parted: bool,
+    /// No side is certain nearer to the surface than this: vertices were joined to decide sides.
+    blur: f64,
 }
 
 /// Winding numbers and what is known about the chain of edges that bounds the surface.
@@ -106,10 +108,25 @@ impl Signs {
     pub fn new(mesh: &TriangleMesh, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
         if choice == SignChoice::Unsigned {
             let reason = "sides were not asked for: distances are positive everywhere".into();
-            return Ok(Self { rule: SignRule { kind: SignKind::Unsigned, reason }, pseudonormals: None, winding: None, parted: true });
+            return Ok(Self {
+                rule: SignRule { kind: SignKind::Unsigned, reason },
+                pseudonormals: None,
+                winding: None,
+                parted: true,
+                blur: 0.0,
+            });
         }
-        let topology = Topology::new(mesh);
+        let mut topology = Topology::new(mesh);
         run.cancel.check()?;
+        let joined = if choice == SignChoice::Pseudonormal || topology.is_closed() { None } else { join_vertices(mesh)? };
+        let blur = joined.as_ref().map_or(0.0, |joined| BLUR * joined.within);
+        let (mesh, note) = match &joined {
+            None => (mesh, None),
+            Some(Joined { mesh: closer, within }) => {
+                topology = Topology::new(closer);
+                (closer, Some(format!("vertices within {within:.1e} of each other were taken for one to decide sides")))
+            }
+        };
         let layers = Layers::new(mesh, &topology);
         let winding = Winding::build(&layers.corners(mesh), run)?;
         let boundary = Boundary::new(mesh, &layers.boundary);
@@ -122,7 +139,14 @@ impl Signs {
                 pseudonormals: None,
                 winding: Some(sum),
                 parted: closed,
+                blur,
             });
+        }
+        if let Some(note) = note {
+            let end = if closed { "which closes the mesh" } else { "and the mesh is still open" };
+            let reason = format!("{note}, {end}; inside is where the winding number is beyond 1/2");
+            let rule = SignRule { kind: SignKind::Winding, reason };
+            return Ok(Self { rule, pseudonormals: None, winding: Some(sum), parted: closed, blur });
         }
         let proof = prove(mesh, &topology, tree, &sum.winding, run)?;
         let (kind, reason) = match (&proof, choice) {
@@ -131,12 +155,12 @@ impl Signs {
                 (SignKind::Pseudonormal, format!("pseudonormals were asked for, but sides are not proven on this mesh: {fault}"))
             }
             (Err(fault), _) => {
-                (SignKind::Winding, format!("{fault}: pseudonormals would not be proven; inside is where the winding number is above 1/2"))
+                (SignKind::Winding, format!("{fault}: pseudonormals would not be proven; inside is where the winding number is beyond 1/2"))
             }
         };
         let parted = closed && !(proof.is_err() && kind == SignKind::Pseudonormal);
         let pseudonormals = (kind == SignKind::Pseudonormal).then(|| Pseudonormals::new(mesh, &topology, proof.as_ref().ok()));
-        Ok(Self { rule: SignRule { kind, reason }, pseudonormals, winding: Some(sum), parted })
+        Ok(Self { rule: SignRule { kind, reason }, pseudonormals, winding: Some(sum), parted, blur })
     }
 
     /// Which rule decides, and why.
@@ -147,6 +171,9 @@ impl Signs {
     /// The side of `p`, whose nearest point is `nearest` on `triangle`.
     pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
         let Some(sum) = &self.winding else { return Side::Outside };
+        if nearest.distance_squared <= self.blur * self.blur {
+            return if sum.side(p).sign() < 0.0 { Side::PerhapsInside } else { Side::PerhapsOutside };
+        }
         match self.pseudonormals.as_ref().and_then(|n| n.side(mesh, p, nearest, triangle)) {
             Some(height) if height < 0.0 => Side::Inside,
             Some(_) => Side::Outside,
@@ -161,6 +188,20 @@ impl Signs {
             // Pseudonormals that are not proven may change their mind anywhere.
             Some(sum) => self.pseudonormals.is_none().then(|| sum.side_of_ball(p, radius)).flatten(),
             None => Some(Side::Outside),
+        }
+    }
+
+    /// The side of `p`, and the length of the paths from it that stay on that side as long as they stay off the
+    /// surface; paths longer than `radius` are not asked for.
+    pub fn steady(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> (Side, f64) {
+        match &self.winding {
+            Some(sum) if !self.parted && self.pseudonormals.is_none() && nearest.distance_squared > self.blur * self.blur => {
+                sum.steady(p, radius)
+            }
+            _ => {
+                let side = self.side(mesh, p, nearest, triangle);
+                (side, if self.parted && side.is_certain() { f64::INFINITY } else { 0.0 })
+            }
         }
     }
 
@@ -209,6 +250,17 @@ impl Sum {
         if (e.value.abs() - 0.5).abs() > e.error { guess(e).certain() } else { guess(e) }
     }
 
+    /// See [`Signs::steady`].
+    fn steady(&self, p: DVec3, radius: f64) -> (Side, f64) {
+        let margin = |e: Estimate| (e.value.abs() - 0.5).abs();
+        let e = self.winding.refine(p, |e| margin(e) > 1.3 * e.error || hopeless(e));
+        let left = margin(e) - e.error;
+        if left <= 0.0 {
+            return (self.side(p), 0.0);
+        }
+        (guess(e).certain(), (left / self.boundary.steepest(p, radius)).min(radius))
+    }
+
     /// See [`Signs::side_of_ball`].
     fn side_of_ball(&self, p: DVec3, radius: f64) -> Option<Side> {
         let change = self.boundary.steepest(p, radius) * radius;
@@ -219,6 +271,49 @@ impl Sum {
         let e = self.winding.refine(p, |e| decided(e) || e.error < 0.25 * change || hopeless(e));
         decided(e).then(|| guess(e).certain())
     }
+}
+
+/// Vertices so many ulp of the largest coordinate apart are taken for one: what exporters leave behind.
+const NOISE: f64 = 8.0 * f64::EPSILON;
+
+/// Seen from so many times the distance they moved, moved edges turn the winding number by less than 1/20.
+const BLUR: f64 = 16.0;
+
+/// A mesh whose vertices were joined, for deciding sides only.
+struct Joined {
+    mesh: TriangleMesh,
+    within: f64,
+}
+
+/// Joins vertices that only rounding keeps apart; `None` where there are none.
+fn join_vertices(mesh: &TriangleMesh) -> Result<Option<Joined>> {
+    let within = NOISE * mesh.extent().min.abs().max(mesh.extent().max.abs()).max_element();
+    // Along a direction in which distinct vertices seldom coincide.
+    let along = DVec3::new(0.614_7, 0.530_3, 0.583_9).normalize();
+    let vertices = mesh.vertices();
+    let mut order: Vec<(f64, u32)> = vertices.iter().enumerate().map(|(i, v)| (v.dot(along), i as u32)).collect();
+    order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut partner: Vec<u32> = (0..vertices.len() as u32).collect();
+    let mut taken = vec![false; vertices.len()];
+    let mut moved = false;
+    for (place, &(start, first)) in order.iter().enumerate() {
+        if std::mem::replace(&mut taken[first as usize], true) {
+            continue;
+        }
+        for &(_, other) in order[place + 1..].iter().take_while(|(at, _)| at - start <= 2.0 * within) {
+            let gap = vertices[other as usize] - vertices[first as usize];
+            if !taken[other as usize] && gap.length() <= within {
+                (taken[other as usize], partner[other as usize]) = (true, first);
+                moved |= gap != DVec3::ZERO;
+            }
+        }
+    }
+    if !moved {
+        return Ok(None);
+    }
+    let triangles = mesh.triangles().iter().map(|t| t.map(|v| partner[v as usize])).collect();
+    // Where joining leaves nothing of the surface the mesh is taken as it is.
+    Ok(TriangleMesh::new(vertices.to_vec(), triangles).ok().map(|mesh| Joined { mesh, within }))
 }
 
 /// Whether the surface passes within rounding of the point and everything else is known well enough to guess.
