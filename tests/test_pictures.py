@@ -12,7 +12,7 @@ import pytest
 import truefield as tf
 from numpy.typing import NDArray
 from PIL import Image
-from truefield import colours, lettering, pictures
+from truefield import colours, layout, lettering, pictures
 from truefield._truefield import Camera, Scene
 
 SMALL = (240, 180)
@@ -235,6 +235,57 @@ def test_unknown_thickness_is_grey() -> None:
     image = pictures.thickness_picture(cube(), [math.nan] * 12, span=(0.0, 1.0), view="top", size=(800, 600))
     red, green, blue = pixels(image)[330, 300]
     assert red == green == blue < 250
+
+
+def test_grey_is_explained_where_it_is_drawn() -> None:
+    def key(values: list[float]) -> int:
+        image = pictures.thickness_picture(cube(), values, span=(0.0, 1.0), view="top", size=(800, 600))
+        # Right of the part, under the colour bar.
+        return int((np.asarray(pixels(image)[:, 600:]) == lettering.UNKNOWN).all(axis=2).sum())
+
+    assert key([math.nan] * 12) > 100
+    assert key([0.5] * 12) == 0
+    assert key([0.5] * 11 + [math.nan]) > 100
+
+
+def test_values_of_as_many_vertices_as_triangles_belong_to_the_vertices() -> None:
+    part = tf.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3], [0, 1, 3], [1, 2, 3]])
+    assert pictures._values(part, [1.0, 2.0, 3.0, 4.0])[1] == "vertex"
+
+
+def test_a_part_is_named_over_its_pictures() -> None:
+    part, long = cube(), tf.TriangleMesh(cube().vertices, cube().triangles, "a name as long as a shelf " * 6)
+    named = pixels(pictures.thickness_picture(part, np.arange(8.0), size=(800, 600)))
+    bare = pixels(pictures.thickness_picture(part, np.arange(8.0), title="", size=(800, 600)))
+    assert (named[:60] < 128).sum() > 200 > (bare[:60] < 128).sum()
+    # Long ones are written smaller, not cut off.
+    for image in (
+        pictures.thickness_picture(long, np.arange(8.0), size=(800, 600)),
+        pictures.heavy_sections_picture(long, [], size=(800, 600)),
+    ):
+        assert (pixels(image)[:60, -20:] == 255).all()
+
+
+@pytest.mark.parametrize("aspect", [0.05, 0.4, 1.0, 1.3, 2.5, 8.0])
+@pytest.mark.parametrize("size", [(1600, 1200), (1200, 1600), (3000, 600)])
+def test_panels_fill_the_page_and_keep_apart(aspect: float, size: tuple[int, int]) -> None:
+    room = (50, 120, size[0] - 50, size[1] - 50)
+    one = layout.single(room, aspect, 250, 30)
+    two = layout.double(room, aspect, 250, 30, 70)
+    for plan in (one, two):
+        boxes = [box for box in plan if box is not None]
+        for left, top, right, bottom in boxes:
+            assert room[0] <= left < right <= room[2]
+            assert room[1] <= top < bottom <= room[3]
+        for index, a in enumerate(boxes):
+            for b in boxes[:index]:
+                assert a[2] <= b[0] or b[2] <= a[0] or a[3] <= b[1] or b[3] <= a[1]
+        wide, high = plan.part[2] - plan.part[0], plan.part[3] - plan.part[1]
+        assert abs(wide - high * aspect) <= max(1.0, aspect)
+        # As large as a side of the room allows beside the column of colours.
+        assert wide >= 0.5 * (room[2] - room[0] - 280) or high >= 0.5 * (room[3] - room[1])
+    assert one.second is None
+    assert two.second is not None
 
 
 def test_the_ball_of_the_thickest_place_is_drawn_and_named(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ Anchor = Literal["la", "ma", "ra", "lm", "mm", "rm", "ls", "ms", "rs", "md", "ld
 INK: Colour = (38, 43, 50)
 FAINT: Colour = (120, 126, 134)
 RULE: Colour = (214, 218, 223)
+UNKNOWN: Colour = (168, 168, 168)
 LIMIT: Colour = (196, 48, 43)
 
 
@@ -122,7 +123,7 @@ def colour_bar(
     def row(value: float) -> float:
         return bottom + (value - span[0]) / (span[1] - span[0]) * (top - bottom)
 
-    places = ticks(*span, most=max(2, min(9, int((bottom - top) / (2.4 * size)))))
+    places = ticks(*span, most=max(2, min(9, int((bottom - top) / (1.9 * size)))))
     for place, label in zip(places, tick_labels(places), strict=True):
         y = round(row(place))
         draw.line((right, y, right + 0.35 * size, y), fill=INK, width=max(1, round(size / 16)))
@@ -138,3 +139,24 @@ def colour_bar(
         text_y = min(at, previous - 1.2 * size)
         previous = text_y
         write(draw, (left - 0.9 * size, text_y), f"{name} {number(value)}", size, colour=LIMIT, anchor="rm")
+
+
+def grey_key(image: Image.Image, at: tuple[int, int], side: int, says: str, size: float) -> None:
+    """A grey box with what grey means on its right; `at` is its left upper corner."""
+    draw = ImageDraw.Draw(image)
+    left, top = at
+    high = round(1.1 * size)
+    draw.rectangle((left - 1, top, left + side, top + high), fill=UNKNOWN, outline=INK)
+    write(draw, (left + side + 0.5 * size, top + 0.5 * high), says, size, anchor="lm")
+
+
+def badge(page: Image.Image, at: tuple[float, float], label: str, text: float, colour: Colour) -> None:
+    """A number in a small white disc with a coloured rim."""
+    scale, radius = 4, 0.72 * text
+    half = math.ceil(radius) + 2
+    disc = Image.new("RGBA", (2 * half * scale, 2 * half * scale), (255, 255, 255, 0))
+    reach = [(half - radius) * scale, (half - radius) * scale, (half + radius) * scale, (half + radius) * scale]
+    ImageDraw.Draw(disc).ellipse(reach, fill=(255, 255, 255, 235), outline=colour, width=round(0.11 * text * scale))
+    disc = disc.resize((2 * half, 2 * half), Image.Resampling.BOX)
+    page.paste(disc, (round(at[0]) - half, round(at[1]) - half), disc)
+    write(ImageDraw.Draw(page), (round(at[0]), round(at[1])), label, 0.9 * text, anchor="mm")

@@ -20,13 +20,16 @@ from truefield.cloud import PointCloud
 from truefield.colours import Colour, colours_of, distinct, even_map
 from truefield.errors import TruefieldError
 from truefield.files import PathLike, replacing
+from truefield.layout import double, single
 from truefield.lettering import (
     FAINT,
     INK,
     LIMIT,
     RULE,
     Box,
+    badge,
     colour_bar,
+    grey_key,
     number,
     tick_labels,
     ticks,
@@ -125,7 +128,8 @@ def thickness_picture(
     below: float | None = None,
     ball: Ball | None = None,
     span: tuple[float, float] | None = None,
-    title: str = "Wall thickness",
+    title: str | None = None,
+    note: str = "",
     view: View = "isometric",
     size: tuple[int, int] = (1600, 1200),
     threads: int | None = None,
@@ -135,16 +139,18 @@ def thickness_picture(
 
     Args:
         mesh: the part.
-        values: thickness per vertex (n,), per triangle (m,) or per corner (m, 3), in model units, or, with `at`, one
-            for each of its points. NaN is drawn grey.
+        values: thickness in model units: (n,) per vertex, (m,) per triangle or (m, 3) per corner, or, with `at`, one
+            for each of its points. Where a mesh has as many vertices as triangles, (n,) is per vertex. NaN is drawn
+            grey; with `at` it is left out.
         path: PNG to write, or None.
         at: points of the surface where the values are known, with triangles or normals; each pixel takes the mean of
-            those around it that face its way.
+            those around it that face its way, and is grey where none is near.
         above: limit marked on the bar.
         below: limit marked on the bar.
         ball: centre (3,) and radius of the largest inscribed ball; None leaves the second panel out.
         span: values at the ends of the bar; None takes those of the data.
-        title: over the picture.
+        title: over the picture; None names the part.
+        note: a line at the foot of the picture.
         view: from where; see the module.
         size: width and height in pixels.
         threads: worker threads.
@@ -162,20 +168,29 @@ def thickness_picture(
     page = Image.new("RGB", size, WHITE)
     draw = ImageDraw.Draw(page)
     edge = round(48 * unit)
-    write(draw, (edge, edge), title, 1.5 * text, anchor="la")
-    write(draw, (edge, edge + 2.0 * text), "model units", text, colour=FAINT, anchor="la")
+    _head(page, f"Wall thickness of {mesh.name}" if title is None else title, "model units", edge, text)
 
     limits = [(name, value) for name, value in (("above", above), ("below", below)) if value is not None]
+    grey = "not measured" if np.isnan(data).any() else ""
+    words = () if ball is None else ("Thickest place:", f"a ball of diameter {number(2.0 * _ball(ball)[1])} fits in")
     names = max([width_of(f"{name} {number(value)}", text) + 1.2 * text for name, value in limits], default=0.0)
     labels = max(width_of(label, text) for label in tick_labels(ticks(*span))) + 0.8 * text
     bar = round(34 * unit)
-    column = round(names + labels + bar + 1.5 * text)
-    top = edge + round(3.9 * text)
-    caption = 0 if ball is None else round(2.2 * text)
-    room = (edge, top, size[0] - edge - column, size[1] - edge - caption)
-    panels = _panels(room, 1 if ball is None else 2, _aspect(camera), round(1.2 * text))
-    left = max(panel[2] for panel in panels) + round(names + 1.5 * text)
-    colour_bar(page, (left, panels[0][1], left + bar, panels[0][3]), span, text, limits)
+    told = width_of(grey, text) + bar + 0.5 * text if grey else 0.0
+    after = max(labels, told - bar)
+    key = round(max([names + bar + after, *(width_of(line, text) for line in words)]))
+    foot = round(1.6 * text) if note else 0
+    write(draw, (edge, size[1] - edge), note, 0.8 * text, colour=FAINT, anchor="ls")
+    room = (edge, edge + round(3.4 * text), size[0] - edge, size[1] - edge - foot)
+    aspect, gap = _aspect(camera), round(1.3 * text)
+    plan = single(room, aspect, key, gap) if ball is None else double(room, aspect, key, gap, round(2.7 * text))
+    # Names, bar and labels together in the middle of their column.
+    left, top, right, bottom = plan.key
+    left += round(0.5 * (right - left - names - bar - after) + names)
+    bottom -= round(2.1 * text) if grey else 0
+    colour_bar(page, (left, top, left + bar, bottom), span, text, limits)
+    if grey:
+        grey_key(page, (left, round(bottom + 0.8 * text)), bar, grey, text)
 
     scene = Scene()
     ramp, ink = np.ascontiguousarray(even_map()), (_LINES, 0.6, _pen(size))
@@ -184,18 +199,18 @@ def thickness_picture(
     else:
         normals = _normals_at(mesh, at)
         scene.add_sampled_mesh(mesh.vertices, mesh.triangles, at.points, normals, data, ramp, span, ink=ink)
-    _place(page, scene, camera, panels[0], (threads, progress))
-    if ball is not None:
+    _place(page, scene, camera, plan.part, (threads, progress))
+    if ball is not None and plan.second is not None:
         center, radius = _ball(ball)
-        box = panels[1]
+        box = plan.second
         glass = Scene()
         _add_part(glass, mesh, size, opacity=_CLEARNESS)
         glass.add_balls(center[None, :], np.array([radius]), np.array([_WARM], dtype=np.uint8))
         _place(page, glass, camera, box, (threads, progress))
-        words = f"Thickest place: a ball of diameter {number(2.0 * radius)} fits in"
-        half = 0.5 * width_of(words, text)
+        half = 0.5 * max(width_of(line, text) for line in words)
         middle = min(max(0.5 * (box[0] + box[2]), edge + half), size[0] - edge - half)
-        write(draw, (middle, box[3] + 1.6 * text), words, text, anchor="ms")
+        for index, line in enumerate(words):
+            write(draw, (middle, box[3] + (1.3 + 1.3 * index) * text), line, text, anchor="ms")
     return _finished(page, path)
 
 
@@ -236,9 +251,8 @@ def heavy_sections_picture(
     draw = ImageDraw.Draw(page)
     count = len(pairs)
     title = "No heavy section" if count == 0 else "1 heavy section" if count == 1 else f"{count} heavy sections"
-    write(draw, (edge, edge), title, 1.5 * text)
     limit = "" if above is None else f"walls thicker than {number(above)}, "
-    write(draw, (edge, edge + 2.0 * text), f"{limit}model units", text, colour=FAINT)
+    _head(page, f"{title} in {mesh.name}", f"{limit}model units", edge, text)
     camera = _camera(mesh, view, margin=0.03)
     scene = Scene()
     _add_part(scene, mesh, size, opacity=_CLEARNESS)
@@ -256,7 +270,7 @@ def heavy_sections_picture(
     left = size[0] - column
     for index, row in enumerate(rows):
         y = top + 1.75 * text * (index + 0.5)
-        _badge(page, (left + 0.6 * text, y), str(index + 1), text, palette[index])
+        badge(page, (left + 0.6 * text, y), str(index + 1), text, palette[index])
         write(draw, (left + 1.8 * text, y), row, text, anchor="lm")
     if shown < count:
         y = top + 1.75 * text * (shown + 0.5)
@@ -265,7 +279,7 @@ def heavy_sections_picture(
         wide, high = box[2] - box[0], box[3] - box[1]
         pixels = camera.project(np.array([center for center, _ in pairs]), wide, high)
         for index, (x, y, _) in enumerate(pixels[:shown].tolist()):
-            _badge(page, (box[0] + x, box[1] + y), str(index + 1), text, palette[index])
+            badge(page, (box[0] + x, box[1] + y), str(index + 1), text, palette[index])
     return _finished(page, path)
 
 
@@ -313,7 +327,7 @@ def histogram_picture(
     edge = round(48 * unit)
     page = Image.new("RGB", size, WHITE)
     draw = ImageDraw.Draw(page)
-    write(draw, (edge, edge), title, 1.5 * text)
+    _head(page, title, f"{share} per bar", edge, text)
 
     most = float(heights.max()) * 1.08
     uprights = ticks(0.0, most, most=6)
@@ -328,7 +342,6 @@ def histogram_picture(
     def y_of(height: float) -> float:
         return bottom - height / most * (bottom - top)
 
-    write(draw, (edge, edge + 2.0 * text), f"{share} per bar", text, colour=FAINT)
     thin = max(1, round(1.5 * unit))
     for place, label in zip(uprights, labels, strict=True):
         y = round(y_of(place))
@@ -422,6 +435,14 @@ def _camera(mesh: TriangleMesh, view: View, more: Array | None = None, *, margin
     return Camera(points, direction=tuple(direction.tolist()), up=tuple(up.tolist()), margin=margin)
 
 
+def _head(page: Image.Image, title: str, subtitle: str, edge: int, text: float) -> None:
+    """Title and subtitle at the top left; a name too long for the page makes the letters smaller."""
+    draw, wide = ImageDraw.Draw(page), width_of(title, 1.5 * text)
+    large = 1.5 * text * min(1.0, (page.width - 2 * edge) / max(wide, 1.0))
+    write(draw, (edge, edge), title, large)
+    write(draw, (edge, edge + 2.0 * text), subtitle, text, colour=FAINT)
+
+
 def _pen(size: tuple[int, int]) -> float:
     """Width of lines in pixels: the same share of any picture."""
     return max(1.0, 1.5 * min(size[0] / 1600, size[1] / 1200))
@@ -473,43 +494,6 @@ def _aspect(camera: Camera) -> float:
     """Width over height of what the camera holds."""
     wide, high = camera.span
     return wide / high
-
-
-def _panels(box: Box, count: int, aspect: float, gap: int) -> list[Box]:
-    """One box, or a large and a smaller one, side by side or one above the other: whichever shows the part larger.
-
-    The boxes have the aspect of what they hold, and the group of them is in the middle of `box`.
-    """
-    left, top, right, bottom = box
-    wide, high = max(right - left, 1), max(bottom - top, 1)
-    shares = [1.0] if count == 1 else [0.58, 0.42]
-    gap = gap if count == 2 else 0
-    beside = min(wide - gap, high * aspect * sum(shares) / shares[0])
-    stacked = min(wide * sum(shares) / shares[0], (high - gap) * aspect)
-    scale = max(beside, stacked, 1.0)
-    sizes = [(max(round(share * scale), 1), max(round(share * scale / aspect), 1)) for share in shares]
-    if beside >= stacked:
-        x = left + (wide - gap - sum(w for w, _ in sizes)) // 2
-        y = top + (high - sizes[0][1]) // 2
-        places = [x] if count == 1 else [x, x + sizes[0][0] + gap]
-        # On one base line.
-        return [(px, y + sizes[0][1] - h, px + w, y + sizes[0][1]) for px, (w, h) in zip(places, sizes, strict=True)]
-    y = top + (high - gap - sum(h for _, h in sizes)) // 2
-    middle = left + wide // 2
-    places = [y] if count == 1 else [y, y + sizes[0][1] + gap]
-    return [(middle - w // 2, py, middle - w // 2 + w, py + h) for py, (w, h) in zip(places, sizes, strict=True)]
-
-
-def _badge(page: Image.Image, at: tuple[float, float], label: str, text: float, colour: Colour) -> None:
-    """A number in a small white disc with a coloured rim."""
-    scale, radius = 4, 0.72 * text
-    half = math.ceil(radius) + 2
-    disc = Image.new("RGBA", (2 * half * scale, 2 * half * scale), (255, 255, 255, 0))
-    reach = [(half - radius) * scale, (half - radius) * scale, (half + radius) * scale, (half + radius) * scale]
-    ImageDraw.Draw(disc).ellipse(reach, fill=(255, 255, 255, 235), outline=colour, width=round(0.11 * text * scale))
-    disc = disc.resize((2 * half, 2 * half), Image.Resampling.BOX)
-    page.paste(disc, (round(at[0]) - half, round(at[1]) - half), disc)
-    write(ImageDraw.Draw(page), (round(at[0]), round(at[1])), label, 0.9 * text, anchor="mm")
 
 
 def _ball(ball: Ball) -> tuple[Array, float]:

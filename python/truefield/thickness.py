@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from truefield import _truefield
 from truefield._truefield import __version__
+from truefield.around import largest_around
 from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.facets import refined
@@ -267,7 +268,9 @@ class ThicknessReport:
 
         `report.json` as `to_json`; `samples.csv`, one row a sample; `heavy-sections.csv`, one row a section;
         `thickness.ply`, the part with large facets split and the ball's diameter at each vertex as
-        the scalar `thickness`; and the pictures `histogram.png`, `thickness.png` and `heavy-sections.png`.
+        the scalar `thickness`; and the pictures `histogram.png`, `thickness.png` and `heavy-sections.png`, seen from
+        the side of the thickest place. In `thickness.png` places beside sharp edges take the diameter of the largest
+        ball close to them, and say so.
 
         Args:
             folder: made if it does not exist; its parent must.
@@ -285,7 +288,7 @@ class ThicknessReport:
             mesh, values = self._chart(threads)
             self._write_mesh(aside / "thickness.ply", mesh, values)
             if pictures:
-                self._draw(aside, mesh, values, threads)
+                self._draw(aside, threads)
             names = [name for name in FILES if (aside / name).exists()]
         return [Path(folder) / name for name in names]
 
@@ -420,23 +423,61 @@ class ThicknessReport:
             known = np.where(np.isfinite(known), known, np.where(counted.any(axis=1), mean, np.nan))
         path.write_bytes(ply.encode(mesh, {"thickness": np.nan_to_num(scalars)}))
 
-    def _draw(self, folder: Path, mesh: TriangleMesh, values: _Floats, threads: int | None) -> None:
+    def _draw(self, folder: Path, threads: int | None) -> None:
         from truefield import pictures
 
         found, part = self.samples, self._surface.mesh
         walls = found.kind == 0
         spheres = walls if walls.any() else np.isfinite(found.thickness_sphere)
         data, weights = found.thickness_sphere[spheres], found.area[spheres]
-        if not np.isfinite(values).any():
-            values = np.full(len(values), float(np.median(data)))
-        pictures.histogram_picture(data, weights, folder / "histogram.png", above=self.above, below=self.below)
-        depth = self.greatest_depth
-        ball = (np.array(depth.point), depth.depth.lower)
+        above, below, depth, view = self.above, self.below, self.greatest_depth, self._view()
+        pictures.histogram_picture(
+            data,
+            weights,
+            folder / "histogram.png",
+            above=above,
+            below=below,
+            title=f"Wall thickness of {self.part}",
+        )
         pictures.thickness_picture(
-            mesh, values, folder / "thickness.png", above=self.above, below=self.below, ball=ball, threads=threads
+            part,
+            self._shown(),
+            folder / "thickness.png",
+            # Without the triangles: the normals of slivers would hide their samples.
+            at=PointCloud(found.point, found.normal),
+            ball=(np.array(depth.point), depth.depth.lower),
+            span=(float(data.min()), max(float(data.max()), 2.0 * depth.depth.lower)),
+            note="Beside sharp edges, where no ball touches two opposing walls: the largest ball that fits in there.",
+            above=above,
+            below=below,
+            view=view,
+            threads=threads,
         )
         balls = [(np.array(s.point), s.depth.lower) for s in self.heavy_sections[:_MOST_BALLS]]
-        pictures.heavy_sections_picture(part, balls, folder / "heavy-sections.png", above=self.above, threads=threads)
+        pictures.heavy_sections_picture(
+            part, balls, folder / "heavy-sections.png", above=above, view=view, threads=threads
+        )
+
+    def _shown(self) -> _Floats:
+        """Thickness at each sample for a picture: beside sharp edges that of the largest ball which fits in there."""
+        found = self.samples
+        shown = np.where(found.kind == 2, np.nan, found.thickness_sphere)
+        beside = np.flatnonzero(found.kind == 1)
+        radii = np.nan_to_num(0.5 * found.thickness_sphere)
+        depth = self.greatest_depth
+        centers = np.concatenate([found.point - radii[:, None] * found.normal, [depth.point]])
+        around = largest_around(
+            found.point[beside], found.normal[beside], centers, np.concatenate([radii, [depth.depth.lower]])
+        )
+        shown[beside] = np.maximum(shown[beside], around)
+        return shown
+
+    def _view(self) -> Point:
+        """The direction to look along, from above one of four corners: towards the side with the thickest place."""
+        low, high = self._surface.mesh.extent
+        x, y, _ = (np.array(self.greatest_depth.point) - 0.5 * (low + high)).tolist()
+        near = 1e-3 * float(np.linalg.norm(high - low))
+        return (1.0 if x < -near else -1.0, -1.0 if y > near else 1.0, -1.0)
 
 
 def thickness(

@@ -134,13 +134,14 @@ impl<'a> Plan<'a> {
         let normals = triangles.normals[element];
         let blend = |axis: usize| (0..3).map(|corner| f64::from(normals[corner][axis]) * at[corner]).sum::<f64>();
         let toward = self.to_viewer(x, y);
-        let smooth = self.lens.camera_vector(DVec3::new(blend(0), blend(1), blend(2))).normalize_or(toward);
+        let blended = DVec3::new(blend(0), blend(1), blend(2));
+        let smooth = self.lens.camera_vector(blended).normalize_or(toward);
         // The flat normal says which side is seen; a smoothed one may point away near the outline.
         let [a, b, c] = self.corners(layer, element);
         let flat = (b - a).cross(c - a);
         let aligned = if flat.dot(smooth) < 0.0 { -flat } else { flat };
         let normal = if aligned.dot(toward) < 0.0 { -smooth } else { smooth };
-        let paint = triangles.paint.inside(element, triangles.triangles[element], &triangles.vertices, at);
+        let paint = triangles.paint.inside(element, triangles.triangles[element], &triangles.vertices, at, blended);
         let (light, highlight) = lit(paint, normal, toward, triangles.finish);
         Look { light, highlight, cosine: normal.dot(toward) }
     }

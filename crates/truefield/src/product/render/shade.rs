@@ -57,8 +57,8 @@ impl Paint {
         }
     }
 
-    /// Colour of a triangle at barycentric coordinates.
-    pub(super) fn inside(&self, triangle: usize, corners: [u32; 3], vertices: &[DVec3], at: [f64; 3]) -> Light {
+    /// Colour of a triangle at barycentric coordinates, where the smoothed normal is `normal`, of any length.
+    pub(super) fn inside(&self, triangle: usize, corners: [u32; 3], vertices: &[DVec3], at: [f64; 3], normal: DVec3) -> Light {
         let blend = |values: [f64; 3]| values[0] * at[0] + values[1] * at[1] + values[2] * at[2];
         match self {
             Self::PerVertex(colours) => {
@@ -69,8 +69,8 @@ impl Paint {
             Self::ValuePerCorner(values, ramp) => ramp.light(blend(values[triangle])),
             Self::Sampled(samples, ramp) => {
                 let [a, b, c] = corners.map(|v| vertices[v as usize]);
-                let normal = (b - a).cross(c - a).normalize_or_zero();
-                ramp.light(samples.at(a * at[0] + b * at[1] + c * at[2], normal))
+                // Not the facet's own normal: that of a sliver may point anywhere.
+                ramp.light(samples.at(a * at[0] + b * at[1] + c * at[2], normal.normalize_or_zero()))
             }
             _ => self.element(triangle),
         }
