@@ -26,7 +26,10 @@ pub fn mesh(vertices: &PyReadonlyArray2<'_, f64>, triangles: &PyReadonlyArray2<'
 /// An (n, 3) float64 array.
 pub fn rows<'py>(py: Python<'py>, points: impl ExactSizeIterator<Item = DVec3>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let count = points.len();
-    let flat: Vec<f64> = points.flat_map(|p| p.to_array()).collect();
+    let mut flat = Vec::with_capacity(3 * count);
+    for p in points {
+        flat.extend_from_slice(&p.to_array());
+    }
     flat.into_pyarray(py).reshape([count, 3])
 }
 

@@ -158,10 +158,14 @@ impl<'a> Builder<'a> {
 
     fn visit(&mut self, at: Visit<'_>) -> Result<Step> {
         let edge = at.block.edge();
+        let settled = self.sides.of_block(&at).map(|side| class(Some(side)));
         if edge > EDGE as i64 {
+            if settled == Some(CellClass::Outside) && self.region == Region::Inside {
+                self.leave_out(&at.block);
+                return Ok(Step::Done);
+            }
             return Ok(Step::Refine);
         }
-        let settled = self.sides.of_block(&at).map(|side| class(Some(side)));
         match settled {
             Some(CellClass::Outside) if self.region == Region::Inside => {
                 self.fill(&at.block, CellClass::Outside, None);
@@ -180,6 +184,20 @@ impl<'a> Builder<'a> {
             _ => {}
         }
         Ok(if at.list.len() <= SHORT && settled.is_some() { Step::Share } else { Step::Refine })
+    }
+
+    /// Blocks that hold nothing.
+    fn leave_out(&mut self, block: &Block) {
+        let edge = EDGE as i64;
+        let places = |axis: usize| block.low[axis].div_euclid(edge)..(block.high[axis] + edge - 1).div_euclid(edge);
+        let empty = Draft::new().seal();
+        for i in places(0) {
+            for j in places(1) {
+                for k in places(2) {
+                    self.done.push(([i, j, k], empty.clone()));
+                }
+            }
+        }
     }
 
     fn class_of_cell(&self, at: &Visit<'_>) -> CellClass {

@@ -98,10 +98,6 @@ struct Flood {
 }
 
 impl Flood {
-    fn place(i: usize) -> [i64; 3] {
-        [i >> 4, i >> 2 & 3, i & 3].map(|x| x as i64)
-    }
-
     /// The slot `step` away, if it is in the block.
     fn neighbour(&self, place: [i64; 3], step: [i64; 3]) -> Option<usize> {
         let at: [i64; 3] = std::array::from_fn(|axis| place[axis] + step[axis]);
@@ -119,13 +115,13 @@ impl Flood {
 
     /// Takes a side over from any of the 26 neighbours.
     fn take_over(&mut self, to: usize) -> bool {
-        let place = Self::place(to);
+        let at = place(to);
         for step in (0..27).map(|n| [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1]) {
             let axes = step.iter().filter(|&&x| x != 0).count();
             if axes == 0 {
                 continue;
             }
-            if let Some(from) = self.neighbour(place, step)
+            if let Some(from) = self.neighbour(at, step)
                 && self.copy(from, to, self.steps[axes - 1])
             {
                 return true;
@@ -143,9 +139,9 @@ impl Flood {
         while height > 0 {
             height -= 1;
             let from = usize::from(stack[height]);
-            let place = Self::place(from);
+            let at = place(from);
             for step in AXES {
-                let Some(to) = self.neighbour(place, step) else { continue };
+                let Some(to) = self.neighbour(at, step) else { continue };
                 if held[to] && self.sides[to].is_none() && self.copy(from, to, self.steps[0]) {
                     stack[height] = to as u8;
                     height += 1;
@@ -170,5 +166,10 @@ fn nearest(tree: &Tree, list: &[Slot], p: DVec3) -> Candidate {
 /// The slots of a block of at most 4 x 4 x 4 that hold its points, with their position in it.
 pub(crate) fn slots(block: &Block) -> impl Iterator<Item = (usize, [i64; 3])> + use<> {
     let size: [i64; 3] = std::array::from_fn(|axis| block.high[axis] - block.low[axis]);
-    (0..size[0]).flat_map(move |i| (0..size[1]).flat_map(move |j| (0..size[2]).map(move |k| ((i * 16 + j * 4 + k) as usize, [i, j, k]))))
+    (0..BLOCK).map(|i| (i, place(i))).filter(move |(_, at)| (0..3).all(|axis| at[axis] < size[axis]))
+}
+
+/// Where a slot lies in its block.
+fn place(i: usize) -> [i64; 3] {
+    [i >> 4, i >> 2 & 3, i & 3].map(|x| x as i64)
 }

@@ -23,6 +23,11 @@ pub(crate) struct Range {
 impl Range {
     /// All distances.
     pub const ALL: Self = Self { lower: 0.0, upper: f64::INFINITY };
+
+    /// Whether both hold a common distance.
+    pub fn meets(self, other: Self) -> bool {
+        self.lower <= other.upper && self.upper >= other.lower
+    }
 }
 
 /// Corners of a box, and witnesses of a box.
@@ -42,16 +47,20 @@ pub(crate) struct Scratch {
     stack: Vec<u32>,
 }
 
+/// The triangle nearest to the centre of `cell`, and the range that follows for all of it.
+pub(crate) fn center_range(tree: &Tree, cell: &Aabb) -> (Candidate, Range) {
+    let nearest = tree.nearest(cell.center(), Candidate::within(f64::INFINITY));
+    let (distance, radius) = (nearest.distance_squared.sqrt(), cell.radius() * (1.0 + 1e-12));
+    (nearest, Range { lower: (distance - radius).max(0.0), upper: distance + radius })
+}
+
 /// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending, if distances in
 /// `window` can occur there.
 pub(crate) fn gather(tree: &Tree, cell: &Aabb, window: Range, scratch: &mut Scratch, out: &mut Vec<Slot>) -> Range {
-    let center = cell.center();
-    let first = tree.nearest(center, Candidate::within(f64::INFINITY));
-    let witness = tree.facet(first.triangle).nearest(center).point;
-    let distance = first.distance_squared.sqrt();
-    let range = Range { lower: (distance - cell.radius()).max(0.0), upper: distance + cell.radius() };
+    let (first, range) = center_range(tree, cell);
     out.clear();
-    if range.lower <= window.upper && range.upper >= window.lower {
+    if range.meets(window) {
+        let witness = tree.facet(first.triangle).nearest(cell.center()).point;
         collect(tree, cell, witness, &mut scratch.stack, out);
         out.sort_unstable();
     }
@@ -153,6 +162,19 @@ fn refine_body<F: Fuse>(
         rows.push(row);
     }
     let mut ranges = [Range::ALL; OCTANTS];
+    if let (&[only], [row]) = (list, rows.as_slice()) {
+        // Nothing to drop; and the distance to one triangle is convex, so largest at a corner.
+        for (i, (out, range)) in out.iter_mut().zip(&mut ranges).enumerate().take(cells.len()) {
+            let corners = &row[i / 2][i % 2 * CORNERS..][..CORNERS];
+            let (low, high) = corners.iter().fold((f32::INFINITY, 0.0f32), |(low, high), &d| (low.min(d), high.max(d)));
+            let error = f64::from(error);
+            let lower = f64::from(low.sqrt()) - error - cells[i].radius();
+            *range = Range { lower: lower.max(0.0), upper: f64::from(high.sqrt()) + error };
+            out.clear();
+            out.push(only);
+        }
+        return ranges;
+    }
     for pair in 0..pairs {
         let offsets = &offsets[pair];
         // Squared distances from every corner to every witness of its box, too large rather than too small by all errors.

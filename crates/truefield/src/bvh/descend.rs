@@ -1,6 +1,6 @@
 //! Halving blocks of a lattice from coarse to fine, each with its complete list of candidates.
 
-use super::cover::{OCTANTS, Range, Scratch, gather, refine};
+use super::cover::{OCTANTS, Range, Scratch, center_range, gather, refine};
 use super::tree::{Slot, Tree};
 use crate::error::Result;
 use crate::geom::Aabb;
@@ -129,6 +129,31 @@ impl<'a> Descent<'a> {
         let mut list = Vec::new();
         let range = gather(self.tree, &cell, window, &mut self.scratch, &mut list);
         self.block(Visit { block: tile, cell, range, list: &list }, edge, visit)
+    }
+
+    /// Visits the parts of `tile`, of edge at most `edge`, where distances in `window` can occur.
+    ///
+    /// Down to blocks of edge `fine` single queries tell where those are: quicker than lists while little is wanted.
+    pub fn survey(
+        &mut self,
+        tile: Block,
+        edge: i64,
+        fine: i64,
+        window: Range,
+        visit: &mut impl FnMut(Visit<'_>) -> Result<Step>,
+    ) -> Result<()> {
+        if edge <= fine {
+            return self.tile(tile, edge, window, visit);
+        }
+        let cell = tile.extent(self.lattice, self.span);
+        let (_, range) = center_range(self.tree, &cell);
+        if !range.meets(window) || visit(Visit { block: tile, cell, range, list: &[] })? == Step::Done {
+            return Ok(());
+        }
+        for half in tile.halves(edge / 2) {
+            self.survey(half, edge / 2, fine, window, visit)?;
+        }
+        Ok(())
     }
 
     fn block(&mut self, at: Visit<'_>, edge: i64, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {

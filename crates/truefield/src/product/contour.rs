@@ -23,6 +23,9 @@ use crate::source::mesh::{Side, Surface};
 /// Edge of the blocks of sub-voxels that are answered at once.
 const EDGE: i64 = 4;
 
+/// Edge of the blocks of sub-voxels for which lists are gathered.
+const FINE: i64 = 32;
+
 /// Blocks along the longest side that workers take, at least.
 const TILES: f64 = 16.0;
 
@@ -71,7 +74,7 @@ pub fn contour(surface: &Surface, distance: f64, tolerance: f64, placement: Plac
         let mut descent = Descent::new(surface.tree(), &scaled, Span::Points);
         let window = tracer.band();
         let mut seen = 0;
-        descent.tile(tiles[index], edge, window, &mut |visit| {
+        descent.survey(tiles[index], edge, FINE, window, &mut |visit| {
             seen += 1;
             if seen % 256 == 0 {
                 run.cancel.check()?;
@@ -150,7 +153,7 @@ impl<'a> Tracer<'a> {
 
     fn visit(&mut self, at: Visit<'_>) -> Step {
         let band = self.band();
-        if at.range.lower > band.upper || at.range.upper < band.lower {
+        if !at.range.meets(band) {
             return Step::Done;
         }
         let side = self.sides.of_block(&at);
