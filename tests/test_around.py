@@ -45,6 +45,6 @@ def test_without_balls_or_points_nothing_fits() -> None:
 def test_a_block_is_shown_as_thick_as_it_is_up_to_its_corners() -> None:
     report = tf.thickness(tf.shapes.box((40.0, 30.0, 20.0)), tolerance=0.05, spacing=1.0)
     assert (report.samples.kind == 1).mean() > 0.2
-    shown = report._shown()
+    shown = np.asarray(report.chart().scalars["thickness"], dtype=np.float64)
     assert shown.max() <= 20.0 + 1e-9
     assert np.percentile(shown, 2) > 19.0

@@ -266,6 +266,22 @@ def test_a_part_is_named_over_its_pictures() -> None:
         assert (pixels(image)[:60, -20:] == 255).all()
 
 
+def test_a_note_stands_at_the_foot_and_letters_may_be_larger() -> None:
+    def foot(image: Image.Image) -> int:
+        return int((pixels(image)[-60:, :300] < 200).sum())
+
+    part, balls = cube(), [((0.5, 0.5, 0.5), 0.2)]
+
+    def walls(note: str, text: float | None) -> Image.Image:
+        return pictures.thickness_picture(part, np.arange(8.0), size=(800, 600), note=note, text=text)
+
+    def heavy(note: str, text: float | None) -> Image.Image:
+        return pictures.heavy_sections_picture(part, balls, size=(800, 600), note=note, text=text)
+
+    for draw in (walls, heavy):
+        assert foot(draw("a note", 26.0)) > 2 * foot(draw("a note", None)) > 2 * foot(draw("", None)) == 0
+
+
 @pytest.mark.parametrize("aspect", [0.05, 0.4, 1.0, 1.3, 2.5, 8.0])
 @pytest.mark.parametrize("size", [(1600, 1200), (1200, 1600), (3000, 600)])
 def test_panels_fill_the_page_and_keep_apart(aspect: float, size: tuple[int, int]) -> None:

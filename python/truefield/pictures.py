@@ -132,6 +132,7 @@ def thickness_picture(
     note: str = "",
     view: View = "isometric",
     size: tuple[int, int] = (1600, 1200),
+    text: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Image.Image:
@@ -153,6 +154,7 @@ def thickness_picture(
         note: a line at the foot of the picture.
         view: from where; see the module.
         size: width and height in pixels.
+        text: height of the letters in pixels; None takes what suits the size.
         threads: worker threads.
         progress: told the phase and the fraction done.
 
@@ -164,7 +166,7 @@ def thickness_picture(
     span = _span(data, span)
     camera = _camera(mesh, view, margin=0.0)
     unit = min(size[0] / 1600, size[1] / 1200)
-    text = 26.0 * unit
+    text = 26.0 * unit if text is None else text
     page = Image.new("RGB", size, WHITE)
     draw = ImageDraw.Draw(page)
     edge = round(48 * unit)
@@ -221,8 +223,10 @@ def heavy_sections_picture(
     *,
     contour: PointCloud | None = None,
     above: float | None = None,
+    note: str = "",
     view: View = "isometric",
     size: tuple[int, int] = (1600, 1200),
+    text: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Image.Image:
@@ -234,8 +238,10 @@ def heavy_sections_picture(
         path: PNG to write, or None.
         contour: drawn inside, for instance where depth equals half the limit.
         above: the limit on wall thickness, for the title.
+        note: a line at the foot of the picture.
         view: from where; see the module.
         size: width and height in pixels.
+        text: height of the letters in pixels; None takes what suits the size.
         threads: worker threads.
         progress: told the phase and the fraction done.
 
@@ -245,14 +251,14 @@ def heavy_sections_picture(
     _check_size(size)
     pairs = [_ball(ball) for ball in balls]
     unit = min(size[0] / 1600, size[1] / 1200)
-    text = 26.0 * unit
+    text = 26.0 * unit if text is None else text
     edge = round(48 * unit)
     page = Image.new("RGB", size, WHITE)
     draw = ImageDraw.Draw(page)
     count = len(pairs)
     title = "No heavy section" if count == 0 else "1 heavy section" if count == 1 else f"{count} heavy sections"
-    limit = "" if above is None else f"walls thicker than {number(above)}, "
-    _head(page, f"{title} in {mesh.name}", f"{limit}model units", edge, text)
+    limit = "" if above is None else f"thicker than {number(above)}; "
+    _head(page, f"{title} in {mesh.name}", f"{limit}diameters of the balls that fit in, model units", edge, text)
     camera = _camera(mesh, view, margin=0.03)
     scene = Scene()
     _add_part(scene, mesh, size, opacity=_CLEARNESS)
@@ -261,11 +267,12 @@ def heavy_sections_picture(
     palette = distinct(count)
     for (center, radius), colour in zip(pairs, palette, strict=True):
         scene.add_balls(center[None, :], np.array([radius]), np.array([colour], dtype=np.uint8))
-    top = edge + round(3.6 * text)
-    shown = min(count, max(1, int((size[1] - top - edge) / (1.75 * text)) - 1))
-    rows = [f"ball of diameter {number(2.0 * radius)}" for _, radius in pairs[:shown]]
+    top, bottom = edge + round(3.6 * text), size[1] - edge - (round(1.6 * text) if note else 0)
+    write(draw, (edge, size[1] - edge), note, 0.8 * text, colour=FAINT, anchor="ls")
+    shown = min(count, max(1, int((bottom - top) / (1.75 * text)) - 1))
+    rows = [number(2.0 * radius) for _, radius in pairs[:shown]]
     column = round(max([width_of(row, text) for row in rows], default=0.0) + 2.4 * text) + edge if rows else edge
-    box = (edge, top, size[0] - column - edge // 2, size[1] - edge)
+    box = (edge, top, size[0] - column - edge // 2, bottom)
     _place(page, scene, camera, box, (threads, progress))
     left = size[0] - column
     for index, row in enumerate(rows):
@@ -436,11 +443,12 @@ def _camera(mesh: TriangleMesh, view: View, more: Array | None = None, *, margin
 
 
 def _head(page: Image.Image, title: str, subtitle: str, edge: int, text: float) -> None:
-    """Title and subtitle at the top left; a name too long for the page makes the letters smaller."""
+    """Title and subtitle at the top left; what is too long for the page is written smaller."""
     draw, wide = ImageDraw.Draw(page), width_of(title, 1.5 * text)
-    large = 1.5 * text * min(1.0, (page.width - 2 * edge) / max(wide, 1.0))
-    write(draw, (edge, edge), title, large)
-    write(draw, (edge, edge + 2.0 * text), subtitle, text, colour=FAINT)
+    room = page.width - 2 * edge
+    write(draw, (edge, edge), title, 1.5 * text * min(1.0, room / max(wide, 1.0)))
+    small = text * min(1.0, room / max(width_of(subtitle, text), 1.0))
+    write(draw, (edge, edge + 2.0 * text), subtitle, small, colour=FAINT)
 
 
 def _pen(size: tuple[int, int]) -> float:

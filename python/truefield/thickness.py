@@ -285,7 +285,7 @@ class ThicknessReport:
             (aside / "report.json").write_text(self.to_json(), encoding="utf-8")
             table.write(aside / "samples.csv", self._sample_columns())
             table.write(aside / "heavy-sections.csv", self._section_columns())
-            mesh, values = self._chart(threads)
+            mesh, values = self._facets(threads)
             self._write_mesh(aside / "thickness.ply", mesh, values)
             if pictures:
                 self._draw(aside, threads)
@@ -302,6 +302,24 @@ class ThicknessReport:
             "kind": found.kind,
         }
         return PointCloud(found.point, found.normal, found.triangle, scalars)
+
+    def chart(self) -> PointCloud:
+        """The samples as the pictures show them: points with normals and the scalar `thickness`.
+
+        On walls that is the diameter of the ball that touches there. Beside sharp edges, where the ball is held by the
+        edge and no measure of a wall, it is that of the largest ball close by: so a solid boss shows how heavy it is.
+        NaN on inner faces.
+        """
+        found = self.samples
+        thickness = np.where(found.kind == 2, np.nan, found.thickness_sphere)
+        beside = np.flatnonzero(found.kind == 1)
+        depth = self.greatest_depth
+        radii = np.append(np.nan_to_num(0.5 * found.thickness_sphere), depth.depth.lower)
+        centers = np.concatenate([found.point - radii[:-1, None] * found.normal, [depth.point]])
+        around = largest_around(found.point[beside], found.normal[beside], centers, radii)
+        thickness[beside] = np.maximum(thickness[beside], around)
+        # Without the triangles: the normals of slivers would hide their samples.
+        return PointCloud(found.point, found.normal, scalars={"thickness": thickness})
 
     def _document(self) -> dict[str, Any]:
         mesh = self._surface.mesh
@@ -379,7 +397,7 @@ class ThicknessReport:
         found |= dict(zip(names.split(), columns, strict=True))
         return found | {"certain": np.array([s.certain for s in self.heavy_sections], dtype=np.uint8)}
 
-    def _chart(self, threads: int | None) -> tuple[TriangleMesh, _Floats]:
+    def _facets(self, threads: int | None) -> tuple[TriangleMesh, _Floats]:
         """The part with small facets, and the ball's diameter on each; NaN near sharp edges and on inner faces."""
         mesh, parents = refined(self._surface.mesh, 3.0 * self.walls.spacing, most=_MOST_FACETS)
         # Facets that were not split have samples of their own.
@@ -430,23 +448,26 @@ class ThicknessReport:
         walls = found.kind == 0
         spheres = walls if walls.any() else np.isfinite(found.thickness_sphere)
         data, weights = found.thickness_sphere[spheres], found.area[spheres]
-        above, below, depth, view = self.above, self.below, self.greatest_depth, self._view()
+        above, below, depth = self.above, self.below, self.greatest_depth
+        view, chart = self._view(), self.chart()
+        # One scale for both, so that a colour means the same.
+        span = (float(data.min()), max(float(data.max()), 2.0 * depth.depth.lower))
         pictures.histogram_picture(
             data,
             weights,
             folder / "histogram.png",
             above=above,
             below=below,
+            span=span,
             title=f"Wall thickness of {self.part}",
         )
         pictures.thickness_picture(
             part,
-            self._shown(),
+            chart.scalars["thickness"],
             folder / "thickness.png",
-            # Without the triangles: the normals of slivers would hide their samples.
-            at=PointCloud(found.point, found.normal),
+            at=chart,
             ball=(np.array(depth.point), depth.depth.lower),
-            span=(float(data.min()), max(float(data.max()), 2.0 * depth.depth.lower)),
+            span=span,
             note="Beside sharp edges, where no ball touches two opposing walls: the largest ball that fits in there.",
             above=above,
             below=below,
@@ -457,20 +478,6 @@ class ThicknessReport:
         pictures.heavy_sections_picture(
             part, balls, folder / "heavy-sections.png", above=above, view=view, threads=threads
         )
-
-    def _shown(self) -> _Floats:
-        """Thickness at each sample for a picture: beside sharp edges that of the largest ball which fits in there."""
-        found = self.samples
-        shown = np.where(found.kind == 2, np.nan, found.thickness_sphere)
-        beside = np.flatnonzero(found.kind == 1)
-        radii = np.nan_to_num(0.5 * found.thickness_sphere)
-        depth = self.greatest_depth
-        centers = np.concatenate([found.point - radii[:, None] * found.normal, [depth.point]])
-        around = largest_around(
-            found.point[beside], found.normal[beside], centers, np.concatenate([radii, [depth.depth.lower]])
-        )
-        shown[beside] = np.maximum(shown[beside], around)
-        return shown
 
     def _view(self) -> Point:
         """The direction to look along, from above one of four corners: towards the side with the thickest place."""
