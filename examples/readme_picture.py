@@ -25,7 +25,7 @@ def main() -> None:
 
     chart = report.chart()
     how = {"above": LIMIT, "view": VIEW, "size": SIZE, "text": 22.0}
-    edges = "beside sharp edges: the largest ball that fits in there"
+    edges = "beside sharp edges: the largest ball close by"
     walls = pictures.thickness_picture(part, chart.scalars["thickness"], at=chart, note=edges, **how)
     balls = [(section.point, section.depth.lower) for section in report.heavy_sections]
     heavy = pictures.heavy_sections_picture(part, balls, contour=shell, note=f"orange: all places {DEPTH} deep", **how)

@@ -468,7 +468,7 @@ class ThicknessReport:
             at=chart,
             ball=(np.array(depth.point), depth.depth.lower),
             span=span,
-            note="Beside sharp edges, where no ball touches two opposing walls: the largest ball that fits in there.",
+            note="Beside sharp edges, where no ball touches two opposing walls: the largest ball close by.",
             above=above,
             below=below,
             view=view,
