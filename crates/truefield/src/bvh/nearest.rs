@@ -50,17 +50,30 @@ impl Tree {
     /// Points are visited along a space-filling curve, each starting from its predecessor's
     /// answer; the result does not depend on that order.
     pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Candidate>> {
+        self.nearest_along(points, run, |_, found| found.to_vec())
+    }
+
+    /// What `answer` makes of points that follow each other along the curve and of their nearest triangles.
+    ///
+    /// It is given up to 1024 indices of points and as many candidates; which ones does not depend on the threads.
+    pub(crate) fn nearest_along<T: Copy + Send>(
+        &self,
+        points: &[DVec3],
+        run: &Run<'_>,
+        answer: impl Fn(&[u32], &[Candidate]) -> Vec<T> + Sync,
+    ) -> Result<Vec<T>> {
         let order = Order::along_curve(points);
         let order = order.indices();
         let blocks = run.blocks("nearest points", order.len().div_ceil(CHUNK), |block| {
             let part = &order[block * CHUNK..((block + 1) * CHUNK).min(order.len())];
-            let mut out = vec![Candidate::within(f64::INFINITY); part.len()];
-            search_many(self, points, part, &mut out);
-            Ok(out)
+            let mut found = vec![Candidate::within(f64::INFINITY); part.len()];
+            search_many(self, points, part, &mut found);
+            Ok(answer(part, &found))
         })?;
-        let mut out = vec![Candidate::within(f64::INFINITY); points.len()];
-        for (&index, candidate) in order.iter().zip(blocks.into_iter().flatten()) {
-            out[index as usize] = candidate;
+        let Some(&any) = blocks.first().and_then(|block| block.first()) else { return Ok(Vec::new()) };
+        let mut out = vec![any; points.len()];
+        for (&index, answer) in order.iter().zip(blocks.into_iter().flatten()) {
+            out[index as usize] = answer;
         }
         Ok(out)
     }

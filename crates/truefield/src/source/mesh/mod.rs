@@ -19,9 +19,6 @@ use crate::run::Run;
 
 pub(crate) use sign::Signs;
 
-/// Points a worker answers in one go.
-const CHUNK: usize = 1024;
-
 /// A triangle mesh with everything needed to answer: exact distances, nearest points and sides.
 ///
 /// Very large and very small meshes are scaled by a power of two inside, which is exact, so that no
@@ -94,27 +91,26 @@ impl Surface {
     /// Signed distances, negative inside; positive or negative by the better guess where the side is
     /// doubtful. About a microsecond a point.
     pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
-        self.each(points, run, |p, found| {
-            let (foot, side) = self.foot_and_side(p, found);
-            side.sign() * foot.distance_squared.sqrt() / self.scale
-        })
+        self.each(points, run, |_, _, foot, side| side.sign() * foot.distance_squared.sqrt() / self.scale)
     }
 
     /// The intervals that contain the true signed distances.
     pub fn bounds(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Interval>> {
-        self.each(points, run, |p, found| {
-            let (foot, side) = self.foot_and_side(p, found);
-            self.interval(&foot, side)
-        })
+        self.each(points, run, |_, _, foot, side| self.interval(foot, side))
     }
 
     /// The nearest points of the surface.
     pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Nearest>> {
-        self.each(points, run, |p, found| self.describe(p, found))
+        self.each(points, run, |p, triangle, foot, side| self.details(p, triangle, foot, side))
     }
 
-    /// `answer` for every point and its nearest triangle, in the tree's units.
-    fn each<T: Send>(&self, points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVec3, Candidate) -> T + Sync) -> Result<Vec<T>> {
+    /// `answer` for every point, its nearest triangle and point, and its side, in the tree's units.
+    fn each<T: Copy + Send>(
+        &self,
+        points: &[DVec3],
+        run: &Run<'_>,
+        answer: impl Fn(DVec3, u32, &FacetPoint, Side) -> T + Sync,
+    ) -> Result<Vec<T>> {
         check_points(points)?;
         let scaled: Vec<DVec3>;
         let points = if self.scale == 1.0 {
@@ -123,12 +119,15 @@ impl Surface {
             scaled = points.iter().map(|&p| p * self.scale).collect();
             &scaled
         };
-        let found = self.tree.nearest_many(points, run)?;
-        let blocks = run.blocks("sides", points.len().div_ceil(CHUNK), |block| {
-            let range = block * CHUNK..((block + 1) * CHUNK).min(points.len());
-            Ok(range.map(|i| answer(points[i], found[i])).collect::<Vec<_>>())
-        })?;
-        Ok(blocks.into_iter().flatten().collect())
+        self.tree.nearest_along(points, run, |indices, found| {
+            let mut walk = Walk::default();
+            let each = indices.iter().zip(found).map(|(&index, found)| {
+                let p = points[index as usize];
+                let foot = self.tree.facet(found.triangle).nearest(p);
+                answer(p, found.triangle, &foot, walk.side(self, p, found.triangle, &foot))
+            });
+            each.collect()
+        })
     }
 
     fn foot_and_side(&self, p: DVec3, found: Candidate) -> (FacetPoint, Side) {
@@ -166,15 +165,19 @@ impl Surface {
     /// The answer in model units for `p` and its nearest triangle in the tree's.
     pub(crate) fn describe(&self, p: DVec3, found: Candidate) -> Nearest {
         let (foot, side) = self.foot_and_side(p, found);
-        let normal = self.normal(p, &foot, found.triangle, side);
+        self.details(p, found.triangle, &foot, side)
+    }
+
+    fn details(&self, p: DVec3, triangle: u32, foot: &FacetPoint, side: Side) -> Nearest {
+        let normal = self.normal(p, foot, triangle, side);
         let point = match foot.feature {
-            Feature::Vertex(corner) => self.mesh.corners(found.triangle)[usize::from(corner)],
+            Feature::Vertex(corner) => self.mesh.corners(triangle)[usize::from(corner)],
             _ => foot.point / self.scale,
         };
         Nearest {
             point,
             distance: side.sign() * foot.distance_squared.sqrt() / self.scale,
-            element: found.triangle,
+            element: triangle,
             feature: foot.feature,
             normal,
         }
@@ -204,6 +207,47 @@ impl Closest for Surface {
         let found = self.tree.nearest(p, Candidate::within(within * self.scale * (1.0 + 1e-15)));
         let nearest = found.found().then(|| self.describe(p, found));
         nearest.filter(|nearest| nearest.distance.abs() <= within)
+    }
+}
+
+/// The side of the last point of a walk, for as long as it holds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Walk(Option<Settled>);
+
+/// A point whose side is certain.
+#[derive(Clone, Copy, Debug)]
+struct Settled {
+    at: DVec3,
+    distance: f64,
+    side: Side,
+    /// The length of paths off the surface that stay on the side.
+    carry: f64,
+}
+
+/// Nearer to the surface than this part of its size every point is asked by itself.
+const ASKED: f64 = 1e-6;
+
+impl Walk {
+    /// The side of `p`: that of the point before, where two balls that overlap leave no room for the surface
+    /// between them, else asked for.
+    fn side(&mut self, surface: &Surface, p: DVec3, triangle: u32, foot: &FacetPoint) -> Side {
+        let distance = foot.distance_squared.sqrt();
+        let apart = distance > ASKED * (surface.tree.radius + p.abs().max_element());
+        if let Some(before) = &self.0
+            && apart
+        {
+            let step = (p - before.at).length() * (1.0 + 1e-9);
+            if step < distance + before.distance && step <= before.carry {
+                let (side, carry) = (before.side, before.carry - step);
+                self.0 = Some(Settled { at: p, distance, side, carry });
+                return side;
+            }
+        }
+        let (side, carry) = surface.steady(p, foot, triangle, 0.5 * distance);
+        if side.is_certain() && apart {
+            self.0 = Some(Settled { at: p, distance, side, carry });
+        }
+        side
     }
 }
 
