@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,14 @@ LONG = {
     "contour": ["--depth", "4", "--tolerance", "0.002", "-o", "{out}/shell.ply"],
     "thickness": ["--above", "10", "--tolerance", "1e-7", "--output", "{out}/report"],
 }
+
+
+@pytest.fixture(autouse=True)
+def heard() -> Iterator[None]:
+    """Children inherit whether Ctrl-C is ignored, as it is where tests run in the background; a user's is not."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize("command", LONG)

@@ -226,7 +226,9 @@ class ThicknessReport:
             f"at {_place(self.greatest_depth.point)}."
         ]
         if greatest.upper - greatest.lower > 2.0 * self.tolerance:
-            says.append("It is not known to the tolerance, because the holes of the mesh leave sides in doubt.")
+            says.append(
+                "It is not known to the tolerance: sides are in doubt there, or the tolerance is beyond the search."
+            )
         if self.heavy is not None and self.above is not None:
             count = len(self.heavy.sections)
             if greatest.upper <= self.above:
