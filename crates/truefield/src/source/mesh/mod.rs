@@ -212,7 +212,12 @@ impl Closest for Surface {
 
 /// The side of the last point of a walk, for as long as it holds.
 #[derive(Clone, Copy, Debug, Default)]
-struct Walk(Option<Settled>);
+struct Walk {
+    settled: Option<Settled>,
+    /// The point before and its distance from the one before that.
+    last: DVec3,
+    step: f64,
+}
 
 /// A point whose side is certain.
 #[derive(Clone, Copy, Debug)]
@@ -233,19 +238,22 @@ impl Walk {
     fn side(&mut self, surface: &Surface, p: DVec3, triangle: u32, foot: &FacetPoint) -> Side {
         let distance = foot.distance_squared.sqrt();
         let apart = distance > ASKED * (surface.tree.radius + p.abs().max_element());
-        if let Some(before) = &self.0
+        (self.last, self.step) = (p, (p - self.last).length());
+        if let Some(before) = &self.settled
             && apart
         {
             let step = (p - before.at).length() * (1.0 + 1e-9);
             if step < distance + before.distance && step <= before.carry {
                 let (side, carry) = (before.side, before.carry - step);
-                self.0 = Some(Settled { at: p, distance, side, carry });
+                self.settled = Some(Settled { at: p, distance, side, carry });
                 return side;
             }
         }
-        let (side, carry) = surface.steady(p, foot, triangle, 0.5 * distance);
+        // How far a side carries is worth knowing only where it may reach the next point.
+        let (side, carry) =
+            if distance > self.step { surface.steady(p, foot, triangle, 0.5 * distance) } else { (surface.side(p, foot, triangle), 0.0) };
         if side.is_certain() && apart {
-            self.0 = Some(Settled { at: p, distance, side, carry });
+            self.settled = Some(Settled { at: p, distance, side, carry });
         }
         side
     }
