@@ -102,7 +102,9 @@ class Surface(_Answering):
         threads: worker threads, all cores by default; results never depend on it.
         progress: called as `progress(phase, fraction)`.
 
-    Building takes O(m log m) for m triangles, about a microsecond a triangle. A query takes about a microsecond.
+    Building takes O(m log m) for m triangles, some 4 microseconds a triangle. A query takes about a microsecond, up to
+    four near a surface that needs winding numbers. Vertices that only rounding keeps apart are taken for one to decide
+    sides, never distances, and `sign_rule` says so.
 
     Raises:
         TruefieldError: the mesh or an argument cannot be used.
@@ -200,7 +202,7 @@ class Surface(_Answering):
             threads: worker threads.
             progress: called as `progress(phase, fraction)`.
 
-        Takes 4 bytes a sample and, coherent as it is, some tens of nanoseconds a sample and thread.
+        Takes 4 bytes a sample and, at 256 samples a side on two threads, 40 to 130 nanoseconds a sample.
         """
         low, high = self._mesh.extent
         low, high = low - _length("margin", margin, least=0.0), high + margin

@@ -351,6 +351,11 @@ fn seams_of_rounding_do_not_let_the_outside_in() {
     let seams = surface(&noisy);
     assert_eq!(seams.sign_rule().kind, SignKind::Winding);
     assert!(seams.sign_rule().reason.contains("closes the mesh"), "{}", seams.sign_rule().reason);
+    // Also where the rule was asked for, joining is said.
+    let asked = Surface::new(mesh(&noisy), SignChoice::Winding, &Run::default()).expect("a surface");
+    assert!(asked.sign_rule().reason.contains("taken for one"), "{}", asked.sign_rule().reason);
+    let plain = Surface::new(mesh(&part), SignChoice::Winding, &Run::default()).expect("a surface");
+    assert!(!plain.sign_rule().reason.contains("taken for one"), "{}", plain.sign_rule().reason);
     let judge = surface(&part);
     let points: Vec<DVec3> = (0..50_000)
         .map(|i| {

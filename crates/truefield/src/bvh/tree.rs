@@ -59,7 +59,7 @@ impl Packet {
 
 /// A bounding volume hierarchy over the triangles of one mesh.
 ///
-/// Memory: about 400 bytes a triangle. Every query is exact: it gives the bits of a brute-force
+/// Memory: about half a kilobyte a triangle. Every query is exact: it gives the bits of a brute-force
 /// search with [`Facet::nearest`] over all triangles, the lowest index on ties.
 #[derive(Clone, Debug)]
 pub struct Tree {

@@ -288,7 +288,7 @@ impl CompleteField {
         (found.distance_squared.sqrt() / scale, side)
     }
 
-    /// Signed distances, negative inside. A tenth of a microsecond a point where lists are short.
+    /// Signed distances, negative inside. A fraction of a microsecond a point where lists are short.
     pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
         self.each(points, run, |p| {
             let (distance, side) = self.distance_and_side(p);

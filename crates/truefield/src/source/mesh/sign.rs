@@ -133,7 +133,8 @@ impl Signs {
         let closed = boundary.is_empty();
         let sum = Sum { winding, boundary, extent: mesh.extent() };
         if choice == SignChoice::Winding {
-            let reason = "winding numbers were asked for; they hold for every mesh".into();
+            let note = note.map_or_else(String::new, |note| format!("; {note}"));
+            let reason = format!("winding numbers were asked for; they hold for every mesh{note}");
             return Ok(Self {
                 rule: SignRule { kind: SignKind::Winding, reason },
                 pseudonormals: None,
