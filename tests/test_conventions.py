@@ -36,7 +36,7 @@ def test_samples_are_indexed_x_y_z_and_lie_where_stated(part: tf.TriangleMesh) -
     assert tf.complete_field(part, resolution=12).shape == (12, 8, 4)
     for sampled in (surface.sample(resolution=13), tf.complete_field(part, resolution=12).sample(resolution=13)):
         assert sampled.values.shape == (13, 9, 5)
-        assert sampled.spacing == 0.5
+        assert sampled.spacing.tolist() == [0.5, 0.5, 0.5]
         assert sampled.origin.tolist() == LOW.tolist()
         index = np.array([[0, 0, 0], [3, 1, 2], [5, 6, 1], np.array(sampled.values.shape) - 1])
         truth = surface.distance(np.asarray(sampled.origin) + index * sampled.spacing)

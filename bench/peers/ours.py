@@ -32,7 +32,7 @@ class _Surface(Solver):
     def _sample(self, lattice: Lattice, band: float | None, clock: Clock, values: NDArray[Any] | None) -> None:
         with clock:
             sampled = self.surface.sample(resolution=max(lattice.shape), band=band, threads=self.threads)
-        here, there = [*sampled.origin, sampled.spacing], [*lattice.first, lattice.spacing]
+        here, there = [*sampled.origin, *sampled.spacing], [*lattice.first, *[lattice.spacing] * 3]
         if tuple(sampled.shape) != lattice.shape or not np.allclose(
             here, there, rtol=1e-12, atol=1e-12 * lattice.spacing
         ):

@@ -21,6 +21,7 @@ __all__ = [
     "complete_field_from_parts",
     "complete_field_parts",
     "contour",
+    "sample",
     "thickness",
     "walls_at",
 ]
@@ -99,25 +100,47 @@ class CompleteField:
 class SampledField:
     def __new__(
         cls,
-        surface: Surface,
+        values: NDArray[np.float32],
         origin: list[float],
-        spacing: float,
-        shape: tuple[int, int, int],
-        band: float | None,
-        memory: int,
-        threads: int | None = None,
-        progress: _Progress = None,
+        spacing: list[float],
+        error: float | None = None,
+        lower: NDArray[np.float32] | None = None,
+        upper: NDArray[np.float32] | None = None,
+        band: float | None = None,
+        doubtful: NDArray[np.uint64] | None = None,
+        continuous: bool = True,
     ) -> SampledField: ...
     @property
-    def lattice(self) -> tuple[list[float], float, tuple[int, int, int]]: ...
+    def lattice(self) -> tuple[list[float], list[float], tuple[int, int, int]]: ...
     @property
     def values(self) -> NDArray[np.float32]: ...
     @property
     def lower(self) -> NDArray[np.float32]: ...
     @property
     def upper(self) -> NDArray[np.float32]: ...
-    def distance(self, points: _Floats) -> _Floats: ...
-    def bounds(self, points: _Floats) -> tuple[_Floats, _Floats]: ...
+    @property
+    def known(self) -> tuple[str, float, NDArray[np.uint64]]: ...
+    @property
+    def continuous(self) -> bool: ...
+    def distance(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
+    def bounds(
+        self, points: _Floats, threads: int | None = None, progress: _Progress = None
+    ) -> tuple[_Floats, _Floats]: ...
+    def gradient(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
+    def complement(self) -> SampledField: ...
+    def offset(self, distance: float, threads: int | None = None, progress: _Progress = None) -> SampledField: ...
+    def combine(
+        self, name: str, other: SampledField, threads: int | None = None, progress: _Progress = None
+    ) -> SampledField: ...
+    def resample(
+        self,
+        origin: list[float],
+        spacing: list[float],
+        shape: tuple[int, int, int],
+        memory: int,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> SampledField: ...
 
 @final
 class Camera:
@@ -201,6 +224,16 @@ class Scene:
         progress: _Progress = None,
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...
 
+def sample(
+    surface: Surface,
+    origin: list[float],
+    spacing: float,
+    shape: tuple[int, int, int],
+    band: float | None,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> SampledField: ...
 def contour(
     surface: Surface,
     distance: float,

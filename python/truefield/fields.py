@@ -6,28 +6,24 @@ Every answer is exact to rounding in double precision; `bounds` gives the guaran
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truefield import _truefield
+from truefield import _truefield, arguments
+from truefield.arguments import Floats, Progress
 from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
+from truefield.sampled import SampledField
 
-Floats = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 Sign = Literal["auto", "pseudonormal", "winding", "unsigned"]
 Region = Literal["everywhere", "inside"]
 Placement = Literal["lattice", "projected"]
 Part = Union[TriangleMesh, "Surface"]
-
-_MOST_CELLS_ALONG_A_SIDE = 2**31
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +67,7 @@ class _Answering:
         Raises:
             TruefieldError: the points are not (n, 3) finite numbers.
         """
-        return self._native.distance(_points(points), threads, progress)
+        return self._native.distance(arguments.points(points), threads, progress)
 
     def bounds(
         self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None
@@ -80,11 +76,11 @@ class _Answering:
 
         They are equal where the answer is exact, and `(-u, +u)` where the side cannot be decided.
         """
-        return self._native.bounds(_points(points), threads, progress)
+        return self._native.bounds(arguments.points(points), threads, progress)
 
     def nearest(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Nearest:
         """The nearest point of the surface for every point."""
-        return Nearest(*self._native.nearest(_points(points), threads, progress))
+        return Nearest(*self._native.nearest(arguments.points(points), threads, progress))
 
     def gradient(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Floats:
         """(n, 3) float64 unit gradients of the signed distance: the `normal` of `nearest`."""
@@ -171,10 +167,10 @@ class Surface(_Answering):
         """
         points, normals, triangle = _truefield.contour(
             self._native,
-            _number("distance", distance),
-            _length("tolerance", tolerance),
+            arguments.number("distance", distance),
+            arguments.length("tolerance", tolerance),
             placement,
-            _memory(memory),
+            arguments.memory(memory),
             threads,
             progress,
         )
@@ -205,17 +201,17 @@ class Surface(_Answering):
         Takes 4 bytes a sample and, at 256 samples a side on two threads, 40 to 130 nanoseconds a sample.
         """
         low, high = self._mesh.extent
-        low, high = low - _length("margin", margin, least=0.0), high + margin
+        low, high = low - arguments.length("margin", margin, least=0.0), high + margin
         if resolution is not None and spacing is not None:
             raise TruefieldError("give resolution or spacing, not both")
         if spacing is None:
-            count = _count("resolution", 256 if resolution is None else resolution, least=2)
+            count = arguments.count("resolution", 256 if resolution is None else resolution, least=2)
             spacing = float(np.max(high - low)) / (count - 1)
-        step = _length("spacing", spacing)
-        shape = _shape((high - low) / step + 1.0, step)
+        step = arguments.length("spacing", spacing)
+        shape = arguments.shape((high - low) / step + 1.0, step)
         origin = (low + high) / 2 - (np.asarray(shape) - 1) * step / 2
-        native = _truefield.SampledField(
-            self._native, origin.tolist(), step, shape, band, _memory(memory), threads, progress
+        native = _truefield.sample(
+            self._native, origin.tolist(), step, shape, band, arguments.memory(memory), threads, progress
         )
         return SampledField(native)
 
@@ -358,118 +354,13 @@ def complete_field(
     if resolution is not None and cell_size is not None:
         raise TruefieldError("give resolution or cell_size, not both")
     if cell_size is None:
-        cell_size = float(np.max(high - low)) / _count("resolution", 128 if resolution is None else resolution, least=1)
-    edge = _length("cell_size", cell_size)
-    shape = _shape(np.ceil((high - low) / edge - 1e-9), edge)
+        cell_size = float(np.max(high - low)) / arguments.count(
+            "resolution", 128 if resolution is None else resolution, least=1
+        )
+    edge = arguments.length("cell_size", cell_size)
+    shape = arguments.shape(np.ceil((high - low) / edge - 1e-9), edge)
     origin = (low + high) / 2 - np.asarray(shape) * edge / 2
     native = _truefield.CompleteField(
-        surface._native, origin.tolist(), edge, shape, region, _memory(memory), threads, progress
+        surface._native, origin.tolist(), edge, shape, region, arguments.memory(memory), threads, progress
     )
     return CompleteField(native, surface)
-
-
-class SampledField:
-    """Signed distances at lattice points, each exact and rounded to single precision; made by `Surface.sample`.
-
-    Node-centred: sample [i, j, k] lies at `origin + spacing * (i, j, k)`. Between samples values are interpolated
-    trilinearly; `bounds` encloses the truth there too.
-    """
-
-    __slots__ = ("_native",)
-
-    def __init__(self, native: _truefield.SampledField) -> None:
-        """Wraps the compiled field."""
-        self._native = native
-
-    @property
-    def values(self) -> NDArray[np.float32]:
-        """(x, y, z) float32 signed distances; read-only, not a copy."""
-        return self._native.values
-
-    @property
-    def lower(self) -> NDArray[np.float32]:
-        """(x, y, z) float32, never above the true distance; a fresh array."""
-        return self._native.lower
-
-    @property
-    def upper(self) -> NDArray[np.float32]:
-        """(x, y, z) float32, never below the true distance; a fresh array."""
-        return self._native.upper
-
-    @property
-    def origin(self) -> Floats:
-        """(3,) position of sample [0, 0, 0], model units."""
-        return np.array(self._native.lattice[0])
-
-    @property
-    def spacing(self) -> float:
-        """Distance of neighbouring samples, model units, the same along all axes."""
-        return self._native.lattice[1]
-
-    @property
-    def shape(self) -> tuple[int, int, int]:
-        """Number of samples along x, y and z."""
-        x, y, z = self._native.lattice[2]
-        return x, y, z
-
-    def distance(self, points: ArrayLike) -> Floats:
-        """(n,) float64 trilinear interpolation of the samples, NaN outside the lattice; `bounds` says how good."""
-        return self._native.distance(_points(points))
-
-    def bounds(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """(n,) float64 lower and upper bounds of the true distance, from the eight samples around each point."""
-        return self._native.bounds(_points(points))
-
-
-def _points(points: ArrayLike) -> Floats:
-    try:
-        array = np.ascontiguousarray(points, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TruefieldError("points are not numbers; give an array of shape (n, 3)") from None
-    if array.ndim == 1 and array.shape[0] == 3:
-        array = array.reshape(1, 3)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise TruefieldError(f"points have shape {array.shape}; give an array of shape (n, 3)")
-    return array
-
-
-def _count(name: str, value: int, least: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise TruefieldError(f"{name} is {value}; give a whole number of at least {least}")
-    return int(value)
-
-
-def _number(name: str, value: float) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise TruefieldError(f"{name} is {value!r}; give a number") from None
-
-
-def _length(name: str, value: float, least: float | None = None) -> float:
-    try:
-        length = float(value)
-    except (TypeError, ValueError):
-        raise TruefieldError(f"{name} is {value!r}; give a length in model units") from None
-    if not np.isfinite(length) or (length <= 0.0 if least is None else length < least):
-        kind = "positive" if least is None else "finite, not negative"
-        raise TruefieldError(f"{name} is {value}; give a {kind} length in model units")
-    return length
-
-
-def _shape(counts: Floats, step: float) -> tuple[int, int, int]:
-    if not np.all(np.isfinite(counts)) or np.max(counts) > _MOST_CELLS_ALONG_A_SIDE:
-        raise TruefieldError(
-            f"a step of {step:g} gives {np.max(counts):.3g} cells along a side; give a coarser resolution"
-        )
-    x, y, z = (max(1, int(np.ceil(count - 1e-9))) for count in counts)
-    return x, y, z
-
-
-def _memory(memory: int | None) -> int:
-    if memory is not None:
-        return _count("memory", memory, least=0)
-    try:
-        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
-    except (AttributeError, ValueError, OSError):
-        return 4 * 2**30

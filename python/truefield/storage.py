@@ -36,8 +36,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truefield import _truefield
+from truefield.arguments import Progress
 from truefield.errors import FileError, TruefieldError
-from truefield.fields import CompleteField, Progress, Region, Sign, Surface
+from truefield.fields import CompleteField, Region, Sign, Surface
 from truefield.files import PathLike, check_file, replacing
 from truefield.mesh import TriangleMesh
 

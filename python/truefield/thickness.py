@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from truefield import _truefield
 from truefield._truefield import __version__
+from truefield.arguments import Progress
 from truefield.around import largest_around
 from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.facets import refined
-from truefield.fields import Part, Progress, SignRule, Surface
+from truefield.fields import Part, SignRule, Surface
 from truefield.files import PathLike, check_folder, replacing_folder
 from truefield.formats import ply, table
 from truefield.mesh import TriangleMesh

@@ -1,15 +1,13 @@
-//! `CompleteField` and `SampledField`.
+//! `CompleteField`.
 
 use std::sync::Arc;
 
-use numpy::ndarray::ArrayView3;
-use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray2};
+use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truefield::build::complete::complete;
-use truefield::build::sampled::sample;
 use truefield::field::complete::Region;
-use truefield::{CompleteField, DVec3, Distance, Error, Grid, SampledField};
+use truefield::{CompleteField, DVec3, Error, Grid};
 
 use crate::convert::column;
 use crate::door::{job, raise};
@@ -131,73 +129,5 @@ impl PyCompleteField {
     ) -> PyResult<NearestArrays<'py>> {
         let points = crate::convert::points(&points)?;
         nearest_arrays(py, &job(py, threads, progress, |run| self.0.nearest_many(&points, run))?)
-    }
-}
-
-/// Samples on a lattice; see `truefield.SampledField`.
-#[pyclass(name = "SampledField", module = "truefield._truefield", frozen)]
-pub struct PySampledField(pub Arc<SampledField>);
-
-#[pymethods]
-impl PySampledField {
-    #[new]
-    #[pyo3(signature = (surface, origin, spacing, shape, band, memory, threads=None, progress=None))]
-    fn new(
-        py: Python<'_>,
-        surface: &PySurface,
-        origin: [f64; 3],
-        spacing: f64,
-        shape: [u32; 3],
-        band: Option<f64>,
-        memory: u64,
-        threads: Option<usize>,
-        progress: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Self> {
-        let lattice = Grid { origin: DVec3::from_array(origin), spacing, first: [0; 3], shape };
-        let surface = Arc::clone(&surface.0);
-        Ok(Self(Arc::new(job(py, threads, progress, |run| sample(&surface, &lattice, band, memory, run))?)))
-    }
-
-    /// `(origin, spacing, shape)`.
-    #[getter]
-    fn lattice(&self) -> ([f64; 3], f64, [u32; 3]) {
-        let lattice = self.0.lattice();
-        (lattice.origin.to_array(), lattice.spacing, lattice.shape)
-    }
-
-    /// A read-only view, not a copy; it keeps the field alive.
-    #[getter]
-    #[allow(unsafe_code)]
-    fn values(this: Bound<'_, Self>) -> PyResult<Bound<'_, PyArray3<f32>>> {
-        let field = Arc::clone(&this.get().0);
-        let shape = field.lattice().shape.map(|n| n as usize);
-        let view = ArrayView3::from_shape(shape, field.values())
-            .map_err(|error| raise(Error::invalid(format!("the samples do not fit their shape: {error}"))))?;
-        // SAFETY: the frozen object `this` holds the samples, never changes them, and becomes the array's base.
-        let array = unsafe { PyArray3::borrow_from_array(&view, this.into_any()) };
-        array.readwrite().make_nonwriteable();
-        Ok(array)
-    }
-
-    #[getter]
-    fn lower<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        self.0.lower().into_pyarray(py).reshape(self.0.lattice().shape.map(|n| n as usize))
-    }
-
-    #[getter]
-    fn upper<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-        self.0.upper().into_pyarray(py).reshape(self.0.lattice().shape.map(|n| n as usize))
-    }
-
-    /// Trilinear values, NaN outside the lattice.
-    fn distance<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<Floats<'py>> {
-        let points = crate::convert::points(&points)?;
-        Ok(column(py, points.iter().map(|&p| self.0.interpolate(p).unwrap_or(f64::NAN))))
-    }
-
-    fn bounds<'py>(&self, py: Python<'py>, points: PyReadonlyArray2<'py, f64>) -> PyResult<(Floats<'py>, Floats<'py>)> {
-        let points = crate::convert::points(&points)?;
-        let bounds: Vec<_> = points.iter().map(|&p| self.0.at(p)).collect();
-        Ok(interval_arrays(py, &bounds))
     }
 }

@@ -9,6 +9,7 @@ mod convert;
 mod door;
 mod field;
 mod render;
+mod sampled;
 mod store;
 mod surface;
 mod thickness;
@@ -20,13 +21,14 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<surface::PySurface>()?;
     module.add_class::<field::PyCompleteField>()?;
-    module.add_class::<field::PySampledField>()?;
+    module.add_class::<sampled::PySampledField>()?;
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(thickness::thickness, module)?)?;
     module.add_function(wrap_pyfunction!(thickness::walls_at, module)?)?;
     module.add_function(wrap_pyfunction!(contour::contour_of, module)?)?;
+    module.add_function(wrap_pyfunction!(sampled::sample_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     Ok(())

@@ -11,9 +11,11 @@ pub mod error;
 pub mod field;
 pub mod geom;
 pub mod grid;
+pub mod lattice;
 #[cfg(feature = "laws")]
 pub mod laws;
 pub mod mesh;
+pub mod op;
 pub mod product;
 pub mod run;
 mod simd;
@@ -21,9 +23,10 @@ pub mod source;
 
 pub use distance::{Closest, Distance};
 pub use error::{Error, Result};
-pub use field::{CompleteField, Parts, SampledField};
+pub use field::{CompleteField, Continuity, Known, Parts, SampledField};
 pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
 pub use grid::Grid;
+pub use lattice::Lattice;
 pub use mesh::TriangleMesh;
 pub use run::{Cancel, Progress, Run, Silent};
 pub use source::mesh::{Check, Found, SignChoice, SignKind, SignRule, Surface};

@@ -16,13 +16,14 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("geom", &[]),
     ("distance", &["geom"]),
     ("grid", &["geom", "distance"]),
+    ("lattice", &["geom", "distance", "grid"]),
     ("mesh", &["geom", "distance"]),
     ("bvh", &["simd", "geom", "distance", "grid", "mesh"]),
     ("source", &["simd", "geom", "distance", "grid", "mesh", "bvh"]),
-    ("field", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source"]),
-    ("build", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field"]),
-    ("op", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field", "build"]),
-    ("product", &["simd", "geom", "distance", "grid", "mesh", "bvh", "source", "field", "build", "op"]),
+    ("field", &["simd", "geom", "distance", "grid", "lattice", "mesh", "bvh", "source"]),
+    ("build", &["simd", "geom", "distance", "grid", "lattice", "mesh", "bvh", "source", "field"]),
+    ("op", &["simd", "geom", "distance", "grid", "lattice", "mesh", "bvh", "source", "field", "build"]),
+    ("product", &["simd", "geom", "distance", "grid", "lattice", "mesh", "bvh", "source", "field", "build", "op"]),
     // The laws ask, and know nobody who answers.
     ("laws", &["geom", "distance", "grid", "mesh"]),
 ];

@@ -10,7 +10,7 @@ use truefield::build::sampled::sample;
 use truefield::field::complete::Region;
 use truefield::laws::{BruteForce, Random, check_closest, check_many, check_range, check_threads, check_truth, places};
 use truefield::{
-    Aabb, Closest, CompleteField, DVec3, Distance, Error, Grid, Interval, Run, SampledField, SignChoice, Surface, TriangleMesh,
+    Aabb, Closest, CompleteField, DVec3, Distance, Error, Grid, Interval, Lattice, Run, SampledField, SignChoice, Surface, TriangleMesh,
 };
 
 const PLENTY: u64 = 1 << 32;
@@ -160,10 +160,8 @@ fn complete_fields_do_not_depend_on_threads() {
 }
 
 /// The sample points in the order of the values.
-fn nodes(lattice: &Grid) -> Vec<DVec3> {
-    let [x, y, z] = lattice.shape.map(i64::from);
-    let [a, b, c] = lattice.first;
-    (0..x * y * z).map(|n| lattice.corner(a + n / (y * z), b + n / z % y, c + n % z)).collect()
+fn nodes(lattice: &Lattice) -> Vec<DVec3> {
+    (0..lattice.len()).map(|n| lattice.node(n)).collect()
 }
 
 fn enclosed(nasty: &Nasty, field: &SampledField, surface: &Surface, brute: &BruteForce, what: &str) {

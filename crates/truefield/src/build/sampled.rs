@@ -12,8 +12,7 @@ use crate::bvh::cover::Range;
 use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
 use crate::bvh::evaluate::{Answers, BLOCK, Points, Rows, evaluate};
 use crate::error::{Error, Result};
-use crate::field::SampledField;
-use crate::field::sampled::Continuity;
+use crate::field::{Continuity, Known, SampledField};
 use crate::grid::Grid;
 use crate::run::Run;
 use crate::source::mesh::{Side, Surface};
@@ -79,7 +78,7 @@ pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64,
     let mut doubtful: Vec<u64> = doubtful.into_iter().flatten().collect();
     doubtful.sort_unstable();
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
-    Ok(SampledField { lattice: *lattice, values, band, doubtful, continuity })
+    SampledField::new((*lattice).into(), values, Known::Rounded { band, doubtful }, continuity)
 }
 
 /// One tile in the making.

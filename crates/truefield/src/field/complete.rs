@@ -6,22 +6,20 @@
 
 use std::sync::Arc;
 
+use super::each::each;
 use crate::bvh::Candidate;
 use crate::distance::{Closest, Distance};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, FacetPoint, Interval, Nearest};
 use crate::grid::Grid;
 use crate::run::Run;
-use crate::source::mesh::{Side, Surface, check_points};
+use crate::source::mesh::{Side, Surface};
 
 /// Cells along an edge of a block.
 pub(crate) const EDGE: usize = 8;
 
 /// Cells of a block.
 pub(crate) const CELLS: usize = EDGE * EDGE * EDGE;
-
-/// Points a worker answers in one go.
-const CHUNK: usize = 4096;
 
 /// Where a cell lies: the paper's in / surface / out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -290,7 +288,7 @@ impl CompleteField {
 
     /// Signed distances, negative inside. A fraction of a microsecond a point where lists are short.
     pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
-        self.each(points, run, |p| {
+        each(points, run, |p| {
             let (distance, side) = self.distance_and_side(p);
             side.sign() * distance
         })
@@ -298,20 +296,12 @@ impl CompleteField {
 
     /// The intervals that contain the true signed distances.
     pub fn bounds(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Interval>> {
-        self.each(points, run, |p| self.at(p))
+        each(points, run, |p| self.at(p))
     }
 
     /// The nearest points of the surface.
     pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Nearest>> {
-        self.each(points, run, |p| self.surface.describe(p * self.surface.scale(), self.search(p).0))
-    }
-
-    fn each<T: Send>(&self, points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVec3) -> T + Sync) -> Result<Vec<T>> {
-        check_points(points)?;
-        let blocks = run.blocks("query the field", points.len().div_ceil(CHUNK), |block| {
-            Ok(points[block * CHUNK..((block + 1) * CHUNK).min(points.len())].iter().map(|&p| answer(p)).collect::<Vec<_>>())
-        })?;
-        Ok(blocks.into_iter().flatten().collect())
+        each(points, run, |p| self.surface.describe(p * self.surface.scale(), self.search(p).0))
     }
 
     /// Counts and sizes.

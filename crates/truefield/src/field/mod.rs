@@ -1,9 +1,10 @@
 //! Stored representations: layout and lookup, no construction.
 
 pub mod complete;
+mod each;
 pub mod parts;
 pub mod sampled;
 
 pub use complete::CompleteField;
 pub use parts::Parts;
-pub use sampled::SampledField;
+pub use sampled::{Continuity, Known, SampledField};

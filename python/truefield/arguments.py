@@ -1,0 +1,76 @@
+"""Arguments that many functions take: turned into what they mean, or refused in one sentence."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truefield.errors import TruefieldError
+
+Floats = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+_MOST_CELLS_ALONG_A_SIDE = 2**31
+
+
+def points(points: ArrayLike) -> Floats:
+    """(n, 3) float64, C-contiguous; a single point may be given as (3,)."""
+    try:
+        array = np.ascontiguousarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TruefieldError("points are not numbers; give an array of shape (n, 3)") from None
+    if array.ndim == 1 and array.shape[0] == 3:
+        array = array.reshape(1, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise TruefieldError(f"points have shape {array.shape}; give an array of shape (n, 3)")
+    return array
+
+
+def count(name: str, value: int, least: int) -> int:
+    """A whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise TruefieldError(f"{name} is {value}; give a whole number of at least {least}")
+    return int(value)
+
+
+def number(name: str, value: float) -> float:
+    """Any number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise TruefieldError(f"{name} is {value!r}; give a number") from None
+
+
+def length(name: str, value: float, least: float | None = None) -> float:
+    """A finite length: positive, or of at least `least`."""
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TruefieldError(f"{name} is {value!r}; give a length in model units") from None
+    if not np.isfinite(length) or (length <= 0.0 if least is None else length < least):
+        kind = "positive" if least is None else "finite, not negative"
+        raise TruefieldError(f"{name} is {value}; give a {kind} length in model units")
+    return length
+
+
+def shape(counts: Floats, step: float) -> tuple[int, int, int]:
+    """Whole numbers of cells or samples along x, y and z, at least one each, from counts by steps of `step`."""
+    if not np.all(np.isfinite(counts)) or np.max(counts) > _MOST_CELLS_ALONG_A_SIDE:
+        raise TruefieldError(
+            f"a step of {step:g} gives {np.max(counts):.3g} cells along a side; give a coarser resolution"
+        )
+    x, y, z = (max(1, int(np.ceil(count - 1e-9))) for count in counts)
+    return x, y, z
+
+
+def memory(memory: int | None) -> int:
+    """Bytes that a job may take; half the machine's memory by default."""
+    if memory is not None:
+        return count("memory", memory, least=0)
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
+    except (AttributeError, ValueError, OSError):
+        return 4 * 2**30

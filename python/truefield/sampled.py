@@ -1,0 +1,266 @@
+"""Samples of a distance on a lattice: what a scanner or a simulation calls a volume, with its bounds.
+
+Node-centred: sample [i, j, k] lies at `origin + spacing * (i, j, k)`, with a spacing for each axis.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truefield import _truefield, arguments
+from truefield.arguments import Floats, Progress
+from truefield.errors import TruefieldError
+
+
+class SampledField:
+    """Signed distances at lattice points in single precision, with what is known of the truth behind them.
+
+    `Surface.sample` makes one of a part, `from_array` one of any array. It is asked like every field: between samples
+    `distance` is interpolated trilinearly, and `bounds` encloses the truth there too, because a distance changes by no
+    more than one moves. Fields on one lattice are combined as solids: `a | b`, `a & b`, `a - b`, `~a`, `a.offset(d)`.
+    """
+
+    __slots__ = ("_native",)
+
+    def __init__(self, native: _truefield.SampledField) -> None:
+        """Wraps the compiled field; `Surface.sample` and `from_array` make one."""
+        self._native = native
+
+    @classmethod
+    def from_array(
+        cls,
+        values: ArrayLike,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        spacing: ArrayLike = 1.0,
+        *,
+        error: float | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> SampledField:
+        """A field of samples from elsewhere; the arrays are copied.
+
+        Args:
+            values: (x, y, z) signed distances, negative inside, stored as float32.
+            origin: (3,) position of sample [0, 0, 0], model units.
+            spacing: distance of neighbouring samples along each axis, (3,) or one number for all, model units.
+            error: the true distance is within this of each value, model units; rounding to float32 included.
+            lower: (x, y, z) lower bounds of the true distances, or
+            upper: (x, y, z) upper bounds; both are stored as float32, rounded outward.
+
+        With neither error nor bounds nothing is promised: `bounds` answers minus to plus infinity.
+
+        Raises:
+            TruefieldError: the arrays do not fit together, hold what is not a number, or bounds that miss their value.
+        """
+        samples = np.ascontiguousarray(_volume("values", values), dtype=np.float32)
+        if error is not None and (lower is not None or upper is not None):
+            raise TruefieldError("give error, or lower and upper, not both")
+        if (lower is None) != (upper is None):
+            raise TruefieldError("lower and upper belong together; give both or neither")
+        low, step = _three("origin", origin), _three("spacing", spacing)
+        if lower is not None and upper is not None:
+            below, above = _outward("lower", lower, -np.inf), _outward("upper", upper, np.inf)
+            return cls(_truefield.SampledField(samples, low, step, lower=below, upper=above))
+        known = np.inf if error is None else arguments.number("error", error)
+        return cls(_truefield.SampledField(samples, low, step, known))
+
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """(x, y, z) float32 signed distances; read-only, not a copy."""
+        return self._native.values
+
+    @property
+    def lower(self) -> NDArray[np.float32]:
+        """(x, y, z) float32, never above the true distance; a fresh array."""
+        return self._native.lower
+
+    @property
+    def upper(self) -> NDArray[np.float32]:
+        """(x, y, z) float32, never below the true distance; a fresh array."""
+        return self._native.upper
+
+    @property
+    def origin(self) -> Floats:
+        """(3,) position of sample [0, 0, 0], model units."""
+        return np.array(self._native.lattice[0])
+
+    @property
+    def spacing(self) -> Floats:
+        """(3,) distance of neighbouring samples along each axis, model units."""
+        return np.array(self._native.lattice[1])
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of samples along x, y and z."""
+        x, y, z = self._native.lattice[2]
+        return x, y, z
+
+    def distance(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Floats:
+        """(n,) float64 trilinear interpolation of the samples, NaN outside the lattice; `bounds` says how good.
+
+        It may miss the bounds by a little, where eight samples know more together than their weighted mean does.
+        """
+        return self._native.distance(arguments.points(points), threads, progress)
+
+    def bounds(
+        self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None
+    ) -> tuple[Floats, Floats]:
+        """(n,) float64 lower and upper bounds of the true distances, at any point.
+
+        The true distance differs between two points by at most the way between them, so each of the eight samples
+        around a point bounds it; outside the lattice, the samples nearest to the point do.
+        """
+        return self._native.bounds(arguments.points(points), threads, progress)
+
+    def gradient(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Floats:
+        """(n, 3) float64 unit vectors along the gradient of `distance`, outward; NaN outside the lattice.
+
+        The derivative of the trilinear interpolation, which jumps from cell to cell; zero where the samples around are
+        all the same.
+        """
+        return self._native.gradient(arguments.points(points), threads, progress)
+
+    def offset(self, distance: float, *, threads: int | None = None, progress: Progress | None = None) -> SampledField:
+        """The solid grown by `distance`, model units, or shrunk if it is negative.
+
+        Values are the samples less `distance`. Bounds enclose the distance of the new solid: as narrow as they were
+        outside of one that grows and inside of one that shrinks. On its other side, where fronts that met may have
+        left it deeper than the samples say, one bound comes from the samples across, some percent wider.
+
+        Raises:
+            TruefieldError: the field is of a mesh with openings, or the distance is not finite.
+        """
+        length = arguments.number("distance", distance)
+        return SampledField(self._native.offset(length, threads, progress))
+
+    def union(
+        self, other: SampledField, *, threads: int | None = None, progress: Progress | None = None
+    ) -> SampledField:
+        """What is in one solid or in the other; also written `a | b`.
+
+        Values are the lesser of both. That is the distance of the union outside of it, and inside where the other solid
+        is farther than the boundary of the one; elsewhere the union is deeper, and `bounds` tells how deep at most.
+
+        Raises:
+            TruefieldError: the fields are on different lattices (see `resample`), or of a mesh with openings.
+        """
+        return self._combined("union", other, threads, progress)
+
+    def intersection(
+        self, other: SampledField, *, threads: int | None = None, progress: Progress | None = None
+    ) -> SampledField:
+        """What is in both solids; also written `a & b`. Values are the greater of both; see `union` for bounds."""
+        return self._combined("intersection", other, threads, progress)
+
+    def difference(
+        self, other: SampledField, *, threads: int | None = None, progress: Progress | None = None
+    ) -> SampledField:
+        """What is in this solid and not in the other; also written `a - b`. See `union` for bounds."""
+        return self._combined("difference", other, threads, progress)
+
+    def complement(self) -> SampledField:
+        """What is outside: all signs changed, as exact as before; also written `~a`."""
+        return SampledField(self._native.complement())
+
+    def resample(
+        self,
+        like: SampledField | None = None,
+        *,
+        origin: ArrayLike | None = None,
+        spacing: ArrayLike | None = None,
+        shape: tuple[int, int, int] | None = None,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> SampledField:
+        """The field on another lattice: interpolated values, and bounds that enclose the truth at the new samples.
+
+        Args:
+            like: a field whose lattice to take, or
+            origin: (3,) position of the first sample, model units; the field's own by default,
+            spacing: along each axis, (3,) or one number for all, model units; the field's own by default,
+            shape: number of samples along x, y and z; by default as many as fit into the field.
+            memory: refuse to take more bytes than this; half the machine's memory by default.
+            threads: worker threads.
+            progress: called as `progress(phase, fraction)`.
+
+        Beyond the field's lattice, values go on growing from its border. Takes 12 bytes a sample.
+
+        Raises:
+            TruefieldError: the lattice cannot be used.
+            MemoryError: the samples do not fit.
+        """
+        if like is not None:
+            if not (origin is None and spacing is None and shape is None):
+                raise TruefieldError("give a field to be like, or origin, spacing and shape, not both")
+            origin, spacing, shape = like.origin, like.spacing, like.shape
+        low = self.origin.tolist() if origin is None else _three("origin", origin)
+        step = self.spacing.tolist() if spacing is None else _three("spacing", spacing)
+        if shape is None:
+            high = self.origin + (np.asarray(self.shape) - 1) * self.spacing
+            with np.errstate(divide="ignore", invalid="ignore"):
+                counts = np.floor((high - low) / np.asarray(step) + 1e-9) + 1
+            counted = arguments.shape(counts, min(step))
+        else:
+            x, y, z = (arguments.count("shape", n, least=1) for n in shape)
+            counted = (x, y, z)
+        native = self._native.resample(low, step, counted, arguments.memory(memory), threads, progress)
+        return SampledField(native)
+
+    def _combined(self, name: str, other: SampledField, threads: int | None, progress: Progress | None) -> SampledField:
+        if not isinstance(other, SampledField):
+            raise TruefieldError(f"a SampledField is combined with another, not with {type(other).__name__}")
+        return SampledField(self._native.combine(name, other._native, threads, progress))
+
+    def __or__(self, other: SampledField) -> SampledField:
+        """The union."""
+        return self.union(other) if isinstance(other, SampledField) else NotImplemented
+
+    def __and__(self, other: SampledField) -> SampledField:
+        """The intersection."""
+        return self.intersection(other) if isinstance(other, SampledField) else NotImplemented
+
+    def __sub__(self, other: SampledField) -> SampledField:
+        """The difference."""
+        return self.difference(other) if isinstance(other, SampledField) else NotImplemented
+
+    def __invert__(self) -> SampledField:
+        """The complement."""
+        return self.complement()
+
+    def __repr__(self) -> str:
+        """Shape and spacing."""
+        (x, y, z), (a, b, c) = self.shape, self.spacing.tolist()
+        return f"SampledField({x} x {y} x {z} samples, spacing {a:.6g}, {b:.6g}, {c:.6g})"
+
+
+def _volume(name: str, values: ArrayLike) -> NDArray[np.float64] | NDArray[np.float32]:
+    try:
+        array = np.asarray(values)
+        if array.dtype != np.float32:
+            array = np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise TruefieldError(f"{name} are not numbers; give an array of shape (x, y, z)") from None
+    if array.ndim != 3 or array.size == 0:
+        raise TruefieldError(f"{name} has shape {array.shape}; give an array of shape (x, y, z)")
+    return array
+
+
+def _outward(name: str, bounds: ArrayLike, towards: float) -> NDArray[np.float32]:
+    """As float32, rounded towards minus or plus infinity."""
+    given = _volume(name, bounds)
+    with np.errstate(over="ignore"):
+        single = np.ascontiguousarray(given, dtype=np.float32)
+    inward = single > given if towards < 0 else single < given
+    if inward.any():
+        single = np.where(inward, np.nextafter(single, np.float32(towards)), single)
+    return single
+
+
+def _three(name: str, value: ArrayLike) -> list[float]:
+    try:
+        three = np.broadcast_to(np.asarray(value, dtype=np.float64), 3)
+    except (TypeError, ValueError):
+        raise TruefieldError(f"{name} is {value!r}; give three numbers, one for each axis") from None
+    return [float(v) for v in three]
