@@ -160,3 +160,40 @@ def test_a_part_s_samples_are_combined_too() -> None:
     shell = field - field.offset(-0.1)
     truth = np.maximum(field.values, -(field.values + 0.1))
     np.testing.assert_allclose(shell.values, truth, atol=1e-5)
+
+
+def test_the_surface_is_a_closed_mesh_like_every_mesh(field: tf.SampledField) -> None:
+    mesh = field.surface()
+    again = tf.TriangleMesh(mesh.vertices, mesh.triangles, mesh.name)
+    for a, b in zip(mesh.extent, again.extent, strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert mesh.vertices.dtype == np.float64
+    assert mesh.triangles.dtype == np.int64
+    assert not mesh.vertices.flags.writeable
+    assert not mesh.triangles.flags.writeable
+    found = mesh.check()
+    assert found.watertight
+    assert found.consistent
+    assert found.volume == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.02)
+    assert tf.Surface(mesh).sign_rule.name == "pseudonormal"
+    np.testing.assert_allclose(ball(mesh.vertices), 0.0, atol=0.01)
+    assert tf.Surface(mesh).distance([0.0, 0.0, 0.0]) < 0
+
+
+def test_a_surface_that_reaches_the_border_is_closed_or_has_a_rim(field: tf.SampledField) -> None:
+    closed, rimmed = field.surface(0.5), field.surface(0.5, border="open")
+    assert closed.check().watertight
+    assert not rimmed.check().watertight
+    low, high = closed.extent
+    assert np.all(low >= ORIGIN - SPACING / 2)
+    assert np.all(high <= ORIGIN + (np.array(SHAPE) - 0.5) * SPACING)
+
+
+def test_surfaces_that_cannot_be_are_one_sentence(field: tf.SampledField) -> None:
+    for distance in (-1.0, np.nan, np.inf):
+        with pytest.raises(tf.TruefieldError, match="distance"):
+            field.surface(distance)
+    with pytest.raises(tf.TruefieldError, match="border"):
+        field.surface(border="none")  # type: ignore[arg-type]
+    with pytest.raises(MemoryError):
+        field.surface(memory=100)

@@ -132,6 +132,14 @@ class SampledField:
     def combine(
         self, name: str, other: SampledField, threads: int | None = None, progress: _Progress = None
     ) -> SampledField: ...
+    def surface(
+        self,
+        distance: float,
+        border: str,
+        memory: int,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> tuple[_Floats, NDArray[np.int64], list[float], list[float]]: ...
     def resample(
         self,
         origin: list[float],

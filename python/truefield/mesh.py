@@ -36,10 +36,20 @@ class TriangleMesh:
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, name: str = "mesh") -> None:
         """Checks and copies the arrays."""
-        self._name: Final = str(name)
-        self._vertices: Final = _frozen(_points(vertices))
-        self._triangles: Final = _frozen(_indices(triangles, len(self._vertices)))
-        self._extent: Final = _extent(self._vertices, self._triangles)
+        self._name = str(name)
+        self._vertices = _frozen(_points(vertices))
+        self._triangles = _frozen(_indices(triangles, len(self._vertices)))
+        self._extent = _extent(self._vertices, self._triangles)
+
+    @classmethod
+    def trusted(
+        cls, vertices: Array, triangles: NDArray[np.int64], lower: Array, upper: Array, name: str
+    ) -> TriangleMesh:
+        """A mesh of arrays that the core has made and checked, kept without a copy, with the box of its triangles."""
+        mesh = cls.__new__(cls)
+        mesh._name, mesh._vertices, mesh._triangles = name, _frozen(vertices), _frozen(triangles)
+        mesh._extent = _frozen(lower), _frozen(upper)
+        return mesh
 
     @property
     def name(self) -> str:

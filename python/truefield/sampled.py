@@ -5,12 +5,17 @@ Node-centred: sample [i, j, k] lies at `origin + spacing * (i, j, k)`, with a sp
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
 from truefield.errors import TruefieldError
+from truefield.mesh import TriangleMesh
+
+Border = Literal["closed", "open"]
 
 
 class SampledField:
@@ -120,6 +125,41 @@ class SampledField:
         all the same.
         """
         return self._native.gradient(arguments.points(points), threads, progress)
+
+    def surface(
+        self,
+        distance: float = 0.0,
+        *,
+        border: Border = "closed",
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> TriangleMesh:
+        """The surface at signed `distance` as a closed triangle mesh: marching cubes, Lorensen and Cline 1987.
+
+        Args:
+            distance: model units, negative inside.
+            border: "closed" closes a surface that reaches the border of the lattice, half a spacing beyond the last
+                samples; "open" ends it there, with a rim.
+            memory: refuse to take more bytes than this; half the machine's memory by default.
+            threads: worker threads; the mesh never depends on them.
+            progress: called as `progress(phase, fraction)`.
+
+        Each vertex lies between two neighbouring samples, one below `distance` and one not, where the straight line
+        between them is at `distance`. Whatever the samples, each side of a triangle belongs to just one other, which
+        runs along it the other way ("open": but for the rim): closed, oriented outward, no holes. Vertices coincide
+        only where a sample is at `distance` itself. Where the sides of samples are certain the true surface is within a
+        spacing of each vertex; what is thinner than a spacing may be missing.
+
+        Raises:
+            TruefieldError: no two neighbouring samples are on different sides of `distance`.
+            MemoryError: the mesh does not fit.
+        """
+        level = arguments.number("distance", distance)
+        vertices, triangles, low, high = self._native.surface(
+            level, border, arguments.memory(memory), threads, progress
+        )
+        return TriangleMesh.trusted(vertices, triangles, np.array(low), np.array(high), "surface")
 
     def offset(self, distance: float, *, threads: int | None = None, progress: Progress | None = None) -> SampledField:
         """The solid grown by `distance`, model units, or shrunk if it is negative.

@@ -9,6 +9,7 @@ use truefield::build::sampled::sample;
 use truefield::op::boolean::{complement, difference, intersection, union};
 use truefield::op::offset::offset;
 use truefield::op::resample::resample;
+use truefield::product::surface::{Border, Triangulation, triangulate};
 use truefield::{Continuity, DVec3, Error, Grid, Known, Lattice, Run, SampledField};
 
 use crate::convert::{column, points, rows};
@@ -17,6 +18,7 @@ use crate::surface::{PySurface, interval_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 type Volume<'py> = Bound<'py, PyArray3<f32>>;
+type MeshArrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, [f64; 3], [f64; 3]);
 
 /// Samples on a lattice; see `truefield.SampledField`.
 #[pyclass(name = "SampledField", module = "truefield._truefield", frozen)]
@@ -209,6 +211,30 @@ impl PySampledField {
             }
         };
         self.derived(py, threads, progress, |field, run| operation(field, &other.0, run))
+    }
+
+    /// `(vertices, triangles, lower, upper)`: a mesh and its box.
+    #[pyo3(signature = (distance, border, memory, threads=None, progress=None))]
+    fn surface<'py>(
+        &self,
+        py: Python<'py>,
+        distance: f64,
+        border: &str,
+        memory: u64,
+        threads: Option<usize>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<MeshArrays<'py>> {
+        let border = match border {
+            "closed" => Border::Closed,
+            "open" => Border::Open,
+            _ => return Err(raise(Error::invalid(format!("border is {border:?}; choose \"closed\" or \"open\"")))),
+        };
+        let made = job(py, threads, progress, |run| triangulate::<i64>(&self.0, distance, border, memory, run))?;
+        let Triangulation { vertices, triangles, extent } = made;
+        let (vertex_count, triangle_count) = (vertices.len(), triangles.len());
+        let vertices = vertices.into_flattened().into_pyarray(py).reshape([vertex_count, 3])?;
+        let triangles = triangles.into_flattened().into_pyarray(py).reshape([triangle_count, 3])?;
+        Ok((vertices, triangles, extent.min.to_array(), extent.max.to_array()))
     }
 
     #[pyo3(signature = (origin, spacing, shape, memory, threads=None, progress=None))]

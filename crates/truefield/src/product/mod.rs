@@ -2,4 +2,5 @@
 
 pub mod contour;
 pub mod render;
+pub mod surface;
 pub mod thickness;
