@@ -11,9 +11,11 @@ from truefield.mesh import TriangleMesh
 from truefield.sampled import SampledField
 from truefield.storage import load
 from truefield.thickness import ThicknessReport, thickness
+from truefield.transform import DistanceTransform, distance_transform, voronoi
 
 __all__ = [
     "CompleteField",
+    "DistanceTransform",
     "FileError",
     "MeshCheck",
     "Nearest",
@@ -26,9 +28,11 @@ __all__ = [
     "TruefieldError",
     "__version__",
     "complete_field",
+    "distance_transform",
     "load",
     "read",
     "read_points",
     "shapes",
     "thickness",
+    "voronoi",
 ]

@@ -21,13 +21,42 @@ __all__ = [
     "complete_field_from_parts",
     "complete_field_parts",
     "contour",
+    "distance_transform",
     "sample",
+    "site_indices",
     "thickness",
+    "transform_bounds",
     "walls_at",
 ]
 
 __version__: str
 
+# Shape, sampling, periodic axes, target, border, surface, memory.
+_Asked = tuple[list[int], list[float], list[bool], str, str, str, int]
+
+def distance_transform(
+    image: NDArray[Any],
+    asked: _Asked,
+    out: NDArray[np.float32],
+    sites: NDArray[np.uint32] | NDArray[np.uint64] | None = None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> None: ...
+def transform_bounds(
+    image: NDArray[Any],
+    asked: _Asked,
+    lower: NDArray[np.float32],
+    upper: NDArray[np.float32],
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> None: ...
+def site_indices(
+    sites: NDArray[np.uint32] | NDArray[np.uint64],
+    shape: list[int],
+    out: NDArray[np.int32] | NDArray[np.int64],
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> None: ...
 def check_mesh(
     vertices: _Floats, triangles: NDArray[np.int64], threads: int | None = None, progress: _Progress = None
 ) -> dict[str, Any]: ...

@@ -13,6 +13,7 @@ mod sampled;
 mod store;
 mod surface;
 mod thickness;
+mod transform;
 
 use pyo3::prelude::*;
 
@@ -29,6 +30,9 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(thickness::walls_at, module)?)?;
     module.add_function(wrap_pyfunction!(contour::contour_of, module)?)?;
     module.add_function(wrap_pyfunction!(sampled::sample_of, module)?)?;
+    module.add_function(wrap_pyfunction!(transform::distance_transform, module)?)?;
+    module.add_function(wrap_pyfunction!(transform::transform_bounds, module)?)?;
+    module.add_function(wrap_pyfunction!(transform::site_indices, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     Ok(())

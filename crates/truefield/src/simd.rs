@@ -1,6 +1,7 @@
 //! Run-time choice of vector instructions: the same Rust body compiled several times.
 //!
-//! This is the only file of the crate with `unsafe`: calling functions compiled for instructions that were
+//! One of two files of the crate with `unsafe` (the other lends columns of an array to threads): calling functions
+//! compiled for instructions that were
 //! just detected, and the comparison of vectors, which no compiler finds by itself. Exact (f64) results never
 //! use fused operations, so they are the same bits at every level; only single-precision filters, whose error
 //! is budgeted, may fuse.
@@ -14,6 +15,9 @@ pub(crate) trait Fuse: Copy {
 
     /// Bit i: `a[i] <= b[i]`.
     fn mask_not_above(a: &[f32; 16], b: &[f32; 16]) -> u32;
+
+    /// Whether any `a[i] > limit`.
+    fn any_above(a: &[u32; 16], limit: u32) -> bool;
 }
 
 /// Two roundings: any machine.
@@ -33,6 +37,11 @@ impl Fuse for Plain {
             mask |= u32::from(a[lane] <= b[lane]) << lane;
         }
         mask
+    }
+
+    #[inline(always)]
+    fn any_above(a: &[u32; 16], limit: u32) -> bool {
+        a.iter().fold(false, |any, &a| any | (a > limit))
     }
 }
 
@@ -60,6 +69,19 @@ impl Fuse for Avx2 {
             half(0) | half(8) << 8
         }
     }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn any_above(a: &[u32; 16], limit: u32) -> bool {
+        // SAFETY: AVX2 was detected; both halves of the array are eight words, and loads need no alignment.
+        unsafe {
+            let (low, high) = (intrinsics::_mm256_loadu_si256(a.as_ptr().cast()), intrinsics::_mm256_loadu_si256(a[8..].as_ptr().cast()));
+            let limit = intrinsics::_mm256_set1_epi32(limit as i32);
+            // There is no unsigned comparison: nothing is above the limit if the maximum is the limit.
+            let same = intrinsics::_mm256_cmpeq_epi32(intrinsics::_mm256_max_epu32(intrinsics::_mm256_max_epu32(low, high), limit), limit);
+            intrinsics::_mm256_movemask_epi8(same) != -1
+        }
+    }
 }
 
 /// One rounding, sixteen lanes: only instantiated by `multiversion!` where AVX-512 was detected.
@@ -81,6 +103,18 @@ impl Fuse for Avx512 {
         unsafe {
             let (a, b) = (intrinsics::_mm512_loadu_ps(a.as_ptr()), intrinsics::_mm512_loadu_ps(b.as_ptr()));
             u32::from(intrinsics::_mm512_cmp_ps_mask::<{ intrinsics::_CMP_LE_OQ }>(a, b))
+        }
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn any_above(a: &[u32; 16], limit: u32) -> bool {
+        // SAFETY: AVX-512 was detected; the array is sixteen words, and loads need no alignment.
+        unsafe {
+            intrinsics::_mm512_cmpgt_epu32_mask(
+                intrinsics::_mm512_loadu_si512(a.as_ptr().cast()),
+                intrinsics::_mm512_set1_epi32(limit as i32),
+            ) != 0
         }
     }
 }

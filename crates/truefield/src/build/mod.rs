@@ -7,3 +7,4 @@ pub mod raster;
 pub mod sampled;
 pub(crate) mod sides;
 pub mod wavefront;
+pub mod transform;
