@@ -15,9 +15,9 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import ArrayLike, NDArray
 
-from truefield import _truefield
+from truefield import _truefield, arguments
+from truefield.arguments import Floats, Progress
 from truefield.errors import TruefieldError
-from truefield.fields import Floats, Progress, _memory
 
 Distances = NDArray[np.float32]
 Sampling = float | Sequence[float] | Floats | None
@@ -341,7 +341,7 @@ def _site(voxels: int) -> np.dtype[Any]:
 
 def _afford(shape: tuple[int, ...], each: int, memory: int | None) -> int:
     """Bytes that are left when every voxel takes so many."""
-    needed, allowed = each * int(np.prod([int(n) for n in shape], dtype=object)), _memory(memory)
+    needed, allowed = each * int(np.prod([int(n) for n in shape], dtype=object)), arguments.memory(memory)
     if needed > allowed:
         raise MemoryError(
             f"a transform of {' x '.join(map(str, shape))} voxels would need about {needed / 2**20:.1f} MiB but only "

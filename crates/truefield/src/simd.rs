@@ -1,10 +1,9 @@
 //! Run-time choice of vector instructions: the same Rust body compiled several times.
 //!
 //! One of two files of the crate with `unsafe` (the other lends columns of an array to threads): calling functions
-//! compiled for instructions that were
-//! just detected, and the comparison of vectors, which no compiler finds by itself. Exact (f64) results never
-//! use fused operations, so they are the same bits at every level; only single-precision filters, whose error
-//! is budgeted, may fuse.
+//! compiled for instructions that were just detected, and the comparison of vectors, which no compiler finds by
+//! itself. Exact (f64) results never use fused operations, so they are the same bits at every level; only
+//! single-precision filters, whose error is budgeted, may fuse.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64 as intrinsics;
