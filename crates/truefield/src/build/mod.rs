@@ -6,5 +6,5 @@ pub mod march;
 pub mod raster;
 pub mod sampled;
 pub(crate) mod sides;
-pub mod wavefront;
 pub mod transform;
+pub mod wavefront;
