@@ -6,5 +6,7 @@ pub mod march;
 pub mod raster;
 pub mod sampled;
 pub(crate) mod sides;
+pub(crate) mod tiles;
 pub mod transform;
+pub mod voxelize;
 pub mod wavefront;

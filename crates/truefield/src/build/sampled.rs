@@ -4,9 +4,8 @@
 //! ([`crate::bvh::cover`]), 64 samples at a time are answered from a list, and a side once known
 //! is handed on to every sample that a path off the surface reaches.
 
-use std::sync::{Mutex, PoisonError};
-
 use super::sides::{Sides, slots};
+use super::tiles::{Dense, TILE, Tile};
 use crate::bvh::Tree;
 use crate::bvh::cover::Range;
 use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
@@ -16,9 +15,6 @@ use crate::field::{Continuity, Known, SampledField};
 use crate::grid::Grid;
 use crate::run::Run;
 use crate::source::mesh::{Side, Surface};
-
-/// Edge of the blocks that workers take, in samples.
-const TILE: i64 = 32;
 
 /// Edge of the blocks that are answered at once.
 const EDGE: i64 = 4;
@@ -40,23 +36,11 @@ pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64,
         let [x, y, z] = lattice.shape;
         return Err(Error::Memory { what: format!("a lattice of {x} x {y} x {z} samples"), needed, allowed: memory });
     }
-    let [_, ny, nz] = lattice.shape.map(|n| n as usize);
     let scale = surface.scale();
     let scaled = Grid { origin: lattice.origin * scale, spacing: lattice.spacing * scale, ..*lattice };
     let mut values = vec![0.0f32; lattice.len()];
     let tiles = Block::tiles(&scaled, TILE);
-    let layer = ny * nz;
-    // Tiles of one slab along x share a lock, held only while a finished tile is written.
-    let first = scaled.first[0];
-    let mut slabs: Vec<(i64, Mutex<&mut [f32]>)> = Vec::new();
-    let mut rest = values.as_mut_slice();
-    let mut low = first;
-    while !rest.is_empty() {
-        let high = (low.div_euclid(TILE) + 1) * TILE;
-        let (slab, after) = rest.split_at_mut(((high - low) as usize * layer).min(rest.len()));
-        slabs.push((low, Mutex::new(slab)));
-        (rest, low) = (after, high);
-    }
+    let dense = Dense::new(&scaled, &mut values);
     let doubtful = run.blocks("sample distances", tiles.len(), |index| {
         let tile = tiles[index];
         let mut sampler = Sampler::new(surface, &scaled, band * scale, tile);
@@ -67,14 +51,10 @@ pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64,
             run.cancel.check()?;
             Ok(sampler.visit(visit))
         })?;
-        let slab = slabs.iter().rfind(|(low, _)| *low <= tile.low[0]);
-        if let Some((low, slab)) = slab {
-            let mut slab = slab.lock().unwrap_or_else(PoisonError::into_inner);
-            sampler.write(&mut slab, *low, &scaled);
-        }
+        dense.write(&sampler.values);
         Ok(sampler.doubtful)
     })?;
-    drop(slabs);
+    drop(dense);
     let mut doubtful: Vec<u64> = doubtful.into_iter().flatten().collect();
     doubtful.sort_unstable();
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
@@ -87,8 +67,7 @@ struct Sampler<'a> {
     tree: &'a Tree,
     lattice: &'a Grid,
     band: f64,
-    tile: Block,
-    values: Vec<f32>,
+    values: Tile<f32>,
     doubtful: Vec<u64>,
     sides: Sides<'a>,
     rows: Rows,
@@ -97,14 +76,12 @@ struct Sampler<'a> {
 
 impl<'a> Sampler<'a> {
     fn new(surface: &'a Surface, lattice: &'a Grid, band: f64, tile: Block) -> Self {
-        let count = (0..3).map(|axis| (tile.high[axis] - tile.low[axis]) as usize).product();
         Self {
             surface,
             tree: surface.tree(),
             lattice,
             band,
-            tile,
-            values: vec![0.0; count],
+            values: Tile::new(tile, 0.0),
             doubtful: Vec::new(),
             sides: Sides::new(surface),
             rows: Rows::default(),
@@ -118,7 +95,7 @@ impl<'a> Sampler<'a> {
             && let Some(side) = side
         {
             let value = (side.sign() * self.band / self.surface.scale()) as f32;
-            self.fill(&at.block, value);
+            self.values.fill(&at.block, value);
             return Step::Done;
         }
         if at.block.edge() > EDGE {
@@ -138,44 +115,12 @@ impl<'a> Sampler<'a> {
         let (scale, limit) = (self.surface.scale(), (self.band / self.surface.scale()) as f32);
         for (i, local) in slots(block) {
             let value = (self.answers.squared[i].sqrt() / scale) as f32;
-            let at = self.index([0, 1, 2].map(|axis| block.low[axis] + local[axis]));
-            self.values[at] = sides[i].sign() as f32 * value.min(limit);
+            *self.values.at([0, 1, 2].map(|axis| block.low[axis] + local[axis])) = sides[i].sign() as f32 * value.min(limit);
             if !sides[i].is_certain() {
                 let global: [u64; 3] = std::array::from_fn(|axis| (block.low[axis] + local[axis] - self.lattice.first[axis]) as u64);
                 let [_, ny, nz] = self.lattice.shape.map(u64::from);
                 self.doubtful.push((global[0] * ny + global[1]) * nz + global[2]);
             }
-        }
-    }
-
-    fn fill(&mut self, block: &Block, value: f32) {
-        for i in block.low[0]..block.high[0] {
-            for j in block.low[1]..block.high[1] {
-                let start = self.index([i, j, block.low[2]]);
-                let count = (block.high[2] - block.low[2]) as usize;
-                self.values[start..start + count].fill(value);
-            }
-        }
-    }
-
-    /// Where global lattice point `(i, j, k)` stands in the tile.
-    fn index(&self, [i, j, k]: [i64; 3]) -> usize {
-        let Block { low, high } = self.tile;
-        (((i - low[0]) * (high[1] - low[1]) + j - low[1]) * (high[2] - low[2]) + k - low[2]) as usize
-    }
-
-    /// Copies the tile into its slab, whose first layer is `start`.
-    fn write(&self, slab: &mut [f32], start: i64, lattice: &Grid) {
-        let Block { low, high } = self.tile;
-        let [_, ny, nz] = lattice.shape.map(|n| n as usize);
-        let length = (high[2] - low[2]) as usize;
-        for (row, values) in self.values.chunks_exact(length).enumerate() {
-            let rows = (high[1] - low[1]) as usize;
-            let i = (low[0] - start) as usize + row / rows;
-            let j = (low[1] - lattice.first[1]) as usize + row % rows;
-            let k = (low[2] - lattice.first[2]) as usize;
-            let at = (i * ny + j) * nz + k;
-            slab[at..at + length].copy_from_slice(values);
         }
     }
 }

@@ -9,7 +9,7 @@ pub use aabb::Aabb;
 pub use facet::{Facet, FacetPoint};
 pub use glam::DVec3;
 pub use interval::Interval;
-pub use overlap::triangle_overlaps_box;
+pub use overlap::{triangle_meets_segment, triangle_overlaps_box};
 
 /// Which part of a triangle is nearest: the papers' cases C1, C2 and C3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,4 +1,4 @@
-//! Whether a triangle and a box share a point.
+//! Whether a triangle and a box, or a segment, share a point.
 
 use super::{Aabb, DVec3};
 
@@ -35,6 +35,30 @@ pub fn triangle_overlaps_box(corners: [DVec3; 3], cell: &Aabb) -> bool {
     let spoilt = 8.0 * f64::EPSILON * edges[0].length() * edges[1].length();
     let d = v[0].dot(n);
     d.abs() <= half.dot(n.abs()) + 3.0 * (spoilt * size + slack * n.abs().max_element())
+}
+
+/// Separating axis test of a closed triangle and a closed segment.
+///
+/// Conservative: contact within rounding counts as overlap, an overlap is never missed. Needles of no area that pass
+/// a segment on all sides of its box may count too.
+pub fn triangle_meets_segment(corners: [DVec3; 3], ends: [DVec3; 2]) -> bool {
+    let center = (ends[0] + ends[1]) * 0.5;
+    let half = (ends[1] - ends[0]) * 0.5;
+    let v = corners.map(|c| c - center);
+    // What rounding of the differences, products and sums below can amount to; an axis may be off by anything.
+    let size = v.iter().fold(half.abs().max_element(), |m, c| m.max(c.abs().max_element()));
+    let slack = 64.0 * f64::EPSILON * (size + center.abs().max_element());
+    let separated = |axis: DVec3| {
+        let d = v.map(|c| c.dot(axis));
+        let reach = half.dot(axis).abs() + slack * 3.0 * axis.abs().max_element();
+        d[0].min(d[1]).min(d[2]) > reach || d[0].max(d[1]).max(d[2]) < -reach
+    };
+    let edges = [v[1] - v[0], v[2] - v[1], v[0] - v[2]];
+    let n = edges[0].cross(edges[1]);
+    let across = edges.map(|e| half.cross(e));
+    // Where the segment lies in the plane of the triangle, the axes in that plane.
+    let along = edges.map(|e| n.cross(e));
+    !([DVec3::X, DVec3::Y, DVec3::Z, n, n.cross(half)].into_iter().chain(across).chain(along).any(separated))
 }
 
 #[cfg(test)]
