@@ -12,6 +12,7 @@ from truefield.sampled import SampledField
 from truefield.storage import load
 from truefield.thickness import ThicknessReport, thickness
 from truefield.transform import DistanceTransform, distance_transform, voronoi
+from truefield.volume import Volume, read_volume
 
 __all__ = [
     "CompleteField",
@@ -26,12 +27,14 @@ __all__ = [
     "ThicknessReport",
     "TriangleMesh",
     "TruefieldError",
+    "Volume",
     "__version__",
     "complete_field",
     "distance_transform",
     "load",
     "read",
     "read_points",
+    "read_volume",
     "shapes",
     "thickness",
     "voronoi",

@@ -14,6 +14,7 @@ from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
 from truefield.errors import TruefieldError
 from truefield.mesh import TriangleMesh
+from truefield.volume import Volume
 
 Border = Literal["closed", "open"]
 
@@ -69,6 +70,22 @@ class SampledField:
             return cls(_truefield.SampledField(samples, low, step, lower=below, upper=above))
         known = np.inf if error is None else arguments.number("error", error)
         return cls(_truefield.SampledField(samples, low, step, known))
+
+    @classmethod
+    def from_volume(cls, volume: Volume, *, error: float | None = None) -> SampledField:
+        """The field whose samples a volume holds; see `from_array`.
+
+        Raises:
+            TruefieldError: it is an image, or its axes are turned: then place its `values` yourself.
+        """
+        if volume.values.ndim != 3 or not volume.straight:
+            what = "is an image" if volume.values.ndim != 3 else "has axes that are turned"
+            raise TruefieldError(f"'{volume.name}' {what}; a field has samples along x, y and z: use from_array")
+        return cls.from_array(volume.values, volume.origin, volume.spacing, error=error)
+
+    def volume(self, name: str = "distance") -> Volume:
+        """The samples with their place, for a file: `field.volume().write("distance.nrrd")`; not a copy."""
+        return Volume(self.values, self.origin, self.spacing, name=name)
 
     @property
     def values(self) -> NDArray[np.float32]:
@@ -302,5 +319,6 @@ def _three(name: str, value: ArrayLike) -> list[float]:
     try:
         three = np.broadcast_to(np.asarray(value, dtype=np.float64), 3)
     except (TypeError, ValueError):
-        raise TruefieldError(f"{name} is {value!r}; give three numbers, one for each axis") from None
+        said = " ".join(repr(value).split())
+        raise TruefieldError(f"{name} is {said:.80}; give three numbers, one for each axis") from None
     return [float(v) for v in three]
