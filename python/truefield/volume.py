@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
 
 import numpy as np
@@ -185,14 +186,25 @@ def read_volume(path: PathLike) -> Volume:
         raise FileError(f"'{file}' is no usable volume: {error}") from None
 
 
-def check(path: PathLike) -> None:
-    """Raises `FileError` if a volume could not be written to `path`; for asking before a long job."""
+def check(path: PathLike, like: Volume | None = None) -> None:
+    """Raises `FileError` if a volume could not be written to `path`; for asking before a long job.
+
+    With a volume to be `like`, one sample of its type and at its place is written for trial, in another folder.
+    """
     from truefield.formats import volumes
 
     if volumes.suffix_of(Path(path)) not in volumes.SUFFIXES:
         raise FileError(f"cannot write a volume to '{path}': its suffix must be one of {', '.join(volumes.SUFFIXES)}")
     if volumes.suffix_of(Path(path)) != ".zarr":
         check_file(path)
+    if like is not None:
+        with TemporaryDirectory() as folder:
+            trial = Path(folder) / Path(path).name
+            one = np.zeros((1,) * len(like.shape), like.values.dtype)
+            try:
+                Volume(one, like.origin, directions=like.directions, space=like.space).write(trial)
+            except FileError as error:
+                raise FileError(str(error).replace(str(trial), str(path))) from None
 
 
 def _numbers(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Floats:

@@ -10,7 +10,10 @@ from truefield.cli.contour import contour
 from truefield.cli.distance import distance
 from truefield.cli.field import field
 from truefield.cli.info import info
+from truefield.cli.sample import sample
+from truefield.cli.surface import surface
 from truefield.cli.thickness import thickness
+from truefield.cli.transform import transform
 
 app = typer.Typer(
     name="truefield",
@@ -20,7 +23,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (info, thickness, contour, distance, field):
+for command in (info, thickness, contour, distance, field, sample, surface, transform):
     app.command()(command)
 
 

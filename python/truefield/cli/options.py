@@ -47,6 +47,17 @@ Weld = Annotated[
 ]
 
 
+Written = Annotated[
+    Path,
+    typer.Option(
+        "--output",
+        "-o",
+        show_default=False,
+        help="What to write: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif or .zarr.",
+    ),
+]
+
+
 Askable = Annotated[
     Path,
     typer.Argument(

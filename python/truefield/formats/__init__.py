@@ -35,9 +35,13 @@ def decode(data: bytes, path: Path) -> Soup:
     return _DECODERS[suffix](data)
 
 
+def check(path: PathLike) -> None:
+    """Raises `FileError` if the suffix of `path` names no format of meshes that is written."""
+    if Path(path).suffix.lower() not in _ENCODERS:
+        raise FileError(f"cannot write a mesh to '{path}': its suffix must be one of {', '.join(WRITABLE)}")
+
+
 def encode(mesh: TriangleMesh, path: PathLike) -> bytes:
     """The content of a mesh file of the format that the suffix of `path` names."""
-    suffix = Path(path).suffix.lower()
-    if suffix not in _ENCODERS:
-        raise FileError(f"cannot write a mesh to '{path}': its suffix must be one of {', '.join(WRITABLE)}")
-    return _ENCODERS[suffix](mesh)
+    check(path)
+    return _ENCODERS[Path(path).suffix.lower()](mesh)

@@ -1,0 +1,66 @@
+"""`truefield sample`: the distances of a part as a volume."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, Written, ready
+from truefield.cli.progress import progress
+
+
+def sample(
+    part: Askable,
+    *,
+    output: Written,
+    resolution: Annotated[
+        int | None, typer.Option("--resolution", show_default="256", help="Samples along the longest side.")
+    ] = None,
+    spacing: Annotated[
+        float | None,
+        typer.Option("--spacing", show_default=False, help="Or the distance of neighbouring samples, in model units."),
+    ] = None,
+    band: Annotated[
+        float | None,
+        typer.Option("--band", show_default="none", help="Cut distances off beyond this, plus and minus; quicker."),
+    ] = None,
+    margin: Annotated[
+        float, typer.Option("--margin", help="How far samples go beyond the box of the part, in model units.")
+    ] = 0.0,
+    lower: Annotated[
+        Path | None, typer.Option("--lower", show_default=False, help="Also write lower bounds of the distances here.")
+    ] = None,
+    upper: Annotated[
+        Path | None, typer.Option("--upper", show_default=False, help="Also write upper bounds of the distances here.")
+    ] = None,
+    sign: SignRule = Sign.AUTO,
+    weld: Weld = None,
+    threads: Threads = None,
+) -> None:
+    """The distances of a part on a lattice, for programs that want a volume.
+
+    Each sample is exact and rounded to single precision, negative inside.
+    """
+    import numpy as np
+
+    import truefield as tf
+    from truefield import volume
+
+    one = tf.Volume(np.zeros((1, 1, 1), np.float32), origin=(0.5, 0.5, 0.5))
+    for path in (output, lower, upper):
+        if path is not None:
+            volume.check(path, one)
+    with progress() as report:
+        surface = ready(part, weld, sign, threads, report)
+        field = surface.sample(resolution, spacing, band=band, margin=margin, threads=threads, progress=report)
+    made = field.volume()
+    made.write(output)
+    for path, bound in ((lower, "lower"), (upper, "upper")):
+        if path is not None:
+            made.holding(getattr(field, bound)).write(path)
+    x, y, z = field.shape
+    least, most = float(made.values.min()), float(made.values.max())
+    typer.echo(f"{output}: {x} x {y} x {z} samples {field.spacing[0]:.6g} apart, from {least:.6g} to {most:.6g}")
+    typer.echo(f"sign rule: {surface.sign_rule.name}, {surface.sign_rule.reason}")

@@ -1,0 +1,104 @@
+"""`truefield transform`: how far the voxels of a scan are from its background."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from truefield.cli.options import Threads, Written
+from truefield.cli.progress import progress
+
+
+class Placing(str, Enum):
+    """From where to where distances go."""
+
+    CENTERS = "centers"
+    BETWEEN = "between"
+
+
+class Beyond(str, Enum):
+    """What lies beyond the image."""
+
+    NOTHING = "nothing"
+    BACKGROUND = "background"
+    FOREGROUND = "foreground"
+
+
+def transform(
+    volume: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IMAGE",
+            show_default=False,
+            help="An image or volume: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif, .png or .zarr.",
+        ),
+    ],
+    *,
+    output: Written,
+    threshold: Annotated[
+        float | None,
+        typer.Option("--threshold", show_default="not 0", help="Foreground is what is above this, not what is not 0."),
+    ] = None,
+    signed: Annotated[
+        bool, typer.Option("--signed", help="Background has distances too, and those of the foreground are negative.")
+    ] = False,
+    labels: Annotated[
+        bool, typer.Option("--labels", help="Distances to the nearest voxel of any other value.")
+    ] = False,
+    surface: Annotated[
+        Placing, typer.Option("--surface", help="From centre to centre, or to the faces `between` voxels.")
+    ] = Placing.CENTERS,
+    border: Annotated[Beyond, typer.Option("--border", help="What lies beyond the image.")] = Beyond.NOTHING,
+    periodic: Annotated[bool, typer.Option("--periodic", help="The image goes on with its other end.")] = False,
+    lower: Annotated[
+        Path | None, typer.Option("--lower", show_default=False, help="Also write lower bounds of the distances here.")
+    ] = None,
+    upper: Annotated[
+        Path | None, typer.Option("--upper", show_default=False, help="Also write upper bounds of the distances here.")
+    ] = None,
+    threads: Threads = None,
+) -> None:
+    """The exact Euclidean distance transform of an image or volume, in its own units and place.
+
+    Bounds enclose the distance to the surface that the voxels stand for, wherever it runs through them.
+    """
+    import numpy as np
+
+    import truefield as tf
+    from truefield.volume import check
+
+    image = tf.read_volume(volume)
+    result = image.holding(np.broadcast_to(np.float32(0), image.shape))
+    for path in (output, lower, upper):
+        if path is not None:
+            check(path, result)
+    values = image.values if threshold is None else image.values > threshold
+    bounds = lower is not None or upper is not None
+    with progress() as report:
+        made = tf.distance_transform(
+            values,
+            # The matrix counts turned axes in; where they are straight, the spacing is the exact one.
+            sampling=image.spacing if image.straight else None,
+            affine=None if image.straight else image.directions.T,
+            signed=signed,
+            target="other_label" if labels else "background",
+            surface=surface.value,
+            border=border.value,
+            periodic=periodic,
+            return_bounds=bounds,
+            threads=threads,
+            progress=report,
+        )
+    distances = np.asarray(made)
+    image.holding(distances).write(output)
+    for path, bound in ((lower, "lower"), (upper, "upper")):
+        if path is not None:
+            image.holding(getattr(made, bound)).write(path)
+    counts = " x ".join(map(str, image.shape))
+    inside = int(np.count_nonzero(values))
+    typer.echo(f"{output}: {counts} samples, {inside} in the foreground, distances to {float(distances.max()):.6g}")
+    if np.isinf(distances).all():
+        typer.echo("all voxels are of one kind, so there is nothing to be near to: all distances are infinite")
