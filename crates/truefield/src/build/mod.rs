@@ -3,6 +3,7 @@
 pub mod complete;
 pub mod difference;
 pub mod march;
+pub mod marched;
 pub mod raster;
 pub mod sampled;
 pub(crate) mod sides;
