@@ -58,6 +58,37 @@ def test_sampling_may_be_one_number_or_a_perpendicular_affine() -> None:
     np.testing.assert_allclose(tf.distance_transform(image, affine=affine[:3, :3]), expected, rtol=2e-7)
 
 
+@pytest.mark.parametrize("kind", ["background", "signed", "other_label"])
+def test_axes_at_any_angles(kind: str) -> None:
+    rng = np.random.default_rng(20)
+    options: dict[str, Any] = {"target": kind} if kind != "signed" else {"signed": True}
+    for shape in ((19, 23), (7, 9, 11), (1, 12), (8, 1, 9)):
+        image = (rng.random(shape) < 0.9) * rng.integers(1, 3, shape)
+        image.reshape(-1)[[0, -1]] = 0, 1
+        matrix = np.eye(len(shape)) + rng.uniform(-0.5, 0.5, (len(shape),) * 2)
+        found: Any = tf.distance_transform(image, affine=matrix, return_indices=True, return_bounds=True, **options)
+        truth = brute(image, matrix, kind)
+        np.testing.assert_allclose(found, truth, rtol=1e-6)
+        np.testing.assert_array_equal(tf.distance_transform(np.asfortranarray(image), affine=matrix, **options), found)
+        steps = np.moveaxis(found.indices - np.indices(shape), 0, -1) @ matrix.T
+        np.testing.assert_allclose(np.linalg.norm(steps, axis=-1), np.abs(truth), rtol=1e-6)
+        assert np.all(found.lower <= truth)
+        assert np.all(truth <= found.upper)
+        faces: Any = tf.distance_transform(image, affine=matrix, surface="between", return_bounds=True, **options)
+        np.testing.assert_array_equal(faces.lower, found.lower)
+        half = np.linalg.norm(matrix, axis=0).sum() / 2
+        assert np.all(np.abs(faces.distance) <= np.abs(truth) * (1 + 1e-6))
+        assert np.all(np.abs(faces.distance) >= np.abs(truth) - half)
+
+
+def test_between_along_skewed_axes_is_the_distance_to_the_faces() -> None:
+    image = np.zeros((12, 12), np.uint8)
+    image[:6] = 1
+    found = tf.distance_transform(image, affine=[[1.0, 0.0], [0.5, 1.0]], surface="between", signed=True)
+    # The face is the line x = 5.5 in indices; far from its ends the distance goes straight to it.
+    np.testing.assert_allclose(found[4:8, 6], [-1.5, -0.5, 0.5, 1.5], rtol=1e-6)
+
+
 def test_between_is_the_distance_to_the_faces() -> None:
     image = np.zeros((40, 40, 40), np.uint8)
     image[10:30, 12:25, 15:22] = 1
@@ -109,10 +140,10 @@ def test_every_type_and_order_gives_the_same(kind: str) -> None:
         lambda a: a[..., 3],
     ):
         for options in ({}, {"signed": True}, {"target": "other_label"}, {"return_indices": True}):
-            expected = tf.distance_transform(
+            expected: Any = tf.distance_transform(
                 np.ascontiguousarray(view(image)), sampling=range(1, view(image).ndim + 1), **options
             )
-            found = tf.distance_transform(view(given), sampling=range(1, view(given).ndim + 1), **options)
+            found: Any = tf.distance_transform(view(given), sampling=range(1, view(given).ndim + 1), **options)
             np.testing.assert_array_equal(found, expected)
             if "return_indices" in options:
                 np.testing.assert_array_equal(found.indices, expected.indices)
@@ -138,7 +169,7 @@ def test_indices_are_sites_at_that_distance_and_the_first_of_them() -> None:
     for shape in SHAPES:
         image = rng.random(shape) < 0.8
         image.reshape(-1)[rng.integers(image.size)] = False
-        found = tf.distance_transform(image, return_indices=True)
+        found: Any = tf.distance_transform(image, return_indices=True)
         assert found.indices.shape == (len(shape), *shape)
         assert found.indices.dtype == np.int32
         assert not image[tuple(found.indices)].any()
@@ -149,9 +180,9 @@ def test_indices_are_sites_at_that_distance_and_the_first_of_them() -> None:
         sites = places[~image.reshape(-1)]
         first = ((places[:, None] - sites[None]) ** 2).sum(axis=2).argmin(axis=1)
         np.testing.assert_array_equal(found.indices.reshape(len(shape), -1).T, sites[first])
-    nowhere = tf.distance_transform(np.ones((3, 4)), return_indices=True)
+    nowhere: Any = tf.distance_transform(np.ones((3, 4)), return_indices=True)
     assert np.all(nowhere.indices == -1)
-    bordered = tf.distance_transform(np.ones((3, 4)), return_indices=True, border="background")
+    bordered: Any = tf.distance_transform(np.ones((3, 4)), return_indices=True, border="background")
     assert np.all(bordered.indices == -1)
 
 
@@ -162,7 +193,7 @@ def test_bounds_hold_for_shapes_that_were_sampled() -> None:
     for _ in range(20):
         centre, radius = rng.uniform(14, 20, 3), rng.uniform(6, 12)
         truth = np.linalg.norm(points - centre, axis=-1) - radius
-        found = tf.distance_transform(truth < 0, sampling=sampling, signed=True, return_bounds=True)
+        found: Any = tf.distance_transform(truth < 0, sampling=sampling, signed=True, return_bounds=True)
         assert np.all(found.lower <= truth)
         assert np.all(truth <= found.upper)
         assert np.all(found.upper - found.lower <= 2.0001 * np.linalg.norm(sampling))
@@ -199,7 +230,7 @@ def test_out_is_written_and_may_be_the_image() -> None:
     room = np.full((20, 30), np.nan, np.float32)
     assert tf.distance_transform(image, out=room) is room
     np.testing.assert_array_equal(room, expected)
-    found = tf.distance_transform(image, out=image, return_indices=True, return_bounds=True)
+    found: Any = tf.distance_transform(image, out=image, return_indices=True, return_bounds=True)
     assert found.distance is image
     np.testing.assert_array_equal(image, expected)
     assert np.all(found.lower <= expected)
@@ -251,6 +282,8 @@ def test_voronoi_gives_the_nearest_label() -> None:
         ({"sampling": "wide"}, "give a length"),
         ({"affine": np.zeros((2, 2))}, "singular"),
         ({"affine": np.eye(4)}, "shape"),
+        ({"affine": [[1.0, 0.1], [0.0, 1.0]], "periodic": True}, "perpendicular"),
+        ({"affine": [[1.0, 0.1], [0.0, 1.0]], "border": "background"}, "perpendicular"),
         ({"affine": np.eye(2), "sampling": 1.0}, "not both"),
         ({"affine": [[1.0, 0, 0], [0, 1, 0], [1, 0, 1]]}, "last row"),
         ({"signed": True, "target": "other_label"}, "inside"),
@@ -284,6 +317,10 @@ def test_images_that_cannot_be_used_are_refused() -> None:
     huge = np.broadcast_to(np.zeros(1, bool), (100_000, 100_000, 1000))
     with pytest.raises(MemoryError, match="100000 x 100000 x 1000"):
         tf.distance_transform(huge)
+    with pytest.raises(tf.TruefieldError, match="2 and 3 axes"):
+        tf.distance_transform(np.ones((2, 2, 2, 2)), affine=np.eye(4) + 0.1)
+    with pytest.raises(MemoryError, match="boundaries"):
+        tf.distance_transform(np.ones((10, 10)), affine=[[1.0, 0.1], [0.0, 1.0]], memory=500)
     with pytest.raises(MemoryError):
         tf.voronoi(np.ones((10, 10)), memory=100)
     with pytest.raises(MemoryError):

@@ -24,6 +24,8 @@ __all__ = [
     "distance_transform",
     "sample",
     "site_indices",
+    "skewed_bounds",
+    "skewed_transform",
     "thickness",
     "transform_bounds",
     "walls_at",
@@ -45,6 +47,27 @@ def distance_transform(
 def transform_bounds(
     image: NDArray[Any],
     asked: _Asked,
+    lower: NDArray[np.float32],
+    upper: NDArray[np.float32],
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> None: ...
+
+# Shape, steps, target, surface, memory.
+_AskedSkewed = tuple[list[int], list[list[float]], str, str, int]
+
+def skewed_transform(
+    image: NDArray[Any],
+    asked: _AskedSkewed,
+    out: NDArray[np.float32],
+    sites: NDArray[np.uint32] | NDArray[np.uint64] | None = None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> None: ...
+def skewed_bounds(
+    image: NDArray[Any],
+    asked: _AskedSkewed,
+    centres: NDArray[np.float32],
     lower: NDArray[np.float32],
     upper: NDArray[np.float32],
     threads: int | None = None,

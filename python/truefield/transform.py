@@ -6,29 +6,27 @@ that order. Zero is background, everything else foreground.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, overload
 
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import ArrayLike, NDArray
 
-from truefield import _truefield, arguments
+from truefield import _truefield, voxels
 from truefield.arguments import Floats, Progress
 from truefield.errors import TruefieldError
+from truefield.voxels import Periodic, Sampling
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Distances = NDArray[np.float32]
-Sampling = float | Sequence[float] | Floats | None
-Periodic = bool | Sequence[bool]
 Placing = Literal["centers", "between"]
 Target = Literal["background", "other_label"]
 Border = Literal["nothing", "background", "foreground"]
 Method = Literal["exact"]
-
-# Axes whose cosine is below this are perpendicular: no distance differs by more than single precision resolves.
-_PERPENDICULAR = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +94,58 @@ class DistanceTransform(NDArrayOperatorsMixin):
         return getattr(ufunc, method)(*plain, **options)
 
 
+class _Options(TypedDict, total=False):
+    """What does not decide the type of the result."""
+
+    sampling: Sampling
+    affine: ArrayLike | None
+    signed: bool
+    surface: Placing
+    target: Target
+    periodic: Periodic
+    border: Border
+    out: Distances | None
+    memory: int | None
+    threads: int | None
+    progress: Progress | None
+
+
+@overload
+def distance_transform(
+    image: ArrayLike,
+    *,
+    method: Literal["exact"] = ...,
+    return_indices: Literal[False] = ...,
+    return_bounds: Literal[False] = ...,
+    **options: Unpack[_Options],
+) -> Distances: ...
+@overload
+def distance_transform(
+    image: ArrayLike,
+    *,
+    method: Method = ...,
+    return_indices: Literal[True],
+    return_bounds: bool = ...,
+    **options: Unpack[_Options],
+) -> DistanceTransform: ...
+@overload
+def distance_transform(
+    image: ArrayLike,
+    *,
+    method: Method = ...,
+    return_indices: bool = ...,
+    return_bounds: Literal[True],
+    **options: Unpack[_Options],
+) -> DistanceTransform: ...
+@overload
+def distance_transform(
+    image: ArrayLike,
+    *,
+    method: Method = ...,
+    return_indices: bool = ...,
+    return_bounds: bool = ...,
+    **options: Unpack[_Options],
+) -> Distances | DistanceTransform: ...
 def distance_transform(
     image: ArrayLike,
     *,
@@ -113,14 +163,15 @@ def distance_transform(
     memory: int | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
-) -> Any:
+) -> Distances | DistanceTransform:
     """The exact Euclidean distance of every voxel to the nearest voxel of the background.
 
     Args:
         image: array of any number of axes; zero is background. Booleans, integers and float32 or float64 in C or
             Fortran order are read where they are; other orders and types are copied.
         sampling: distance of neighbouring voxels along each axis, or one for all (default 1).
-        affine: in place of `sampling`, the (n, n) or (n + 1, n + 1) matrix that takes indices to positions.
+        affine: in place of `sampling`, the (n, n) or (n + 1, n + 1) matrix that takes indices to positions. Two or
+            three axes may be at any angles; with cosines above 1e-7, a tree over the boundary is searched.
         signed: also give background voxels their distance to the foreground, and make the foreground's negative.
         surface: "centers": distances go from centre to centre. "between": they go from the centre to the faces between
             foreground and background voxels, half a voxel nearer where a face is straight ahead.
@@ -150,7 +201,8 @@ def distance_transform(
     the background and meets each of them that has a neighbour in the foreground. Signed or with labels: for every
     surface that stays within voxels that have a neighbour (across faces, edges or corners) of another label,
     if the shape of each label has a point in each of its voxels. No closer bounds hold for all of these; they are never
-    farther from the distance than the paper's half diagonal of a voxel, or 3/2 of it to the surface's side if signed.
+    farther from the distance of centres than half a diagonal of a voxel, or three halves towards the surface if signed,
+    and along axes that are not perpendicular just as far.
 
     Saito and Toriwaki 1994 and Felzenszwalb and Huttenlocher 2012 show that squared distances are separable.
 
@@ -166,34 +218,28 @@ def distance_transform(
         raise TruefieldError(
             "labels have no inside, so signed distances need target='background'; leave one of them out"
         )
-    array = _image(image)
-    spacing = _spacing(sampling, affine, array.ndim)
-    around = _periodic(periodic, array.ndim)
-    extra = return_indices or return_bounds
-    spare = _afford(
-        array.shape, (4 * (out is None) + _site(array.size).itemsize * return_indices + 8 * return_bounds), memory
-    )
+    given = voxels.array(image)
+    place = voxels.placement(sampling, affine, given.ndim)
+    around = voxels.periodic_axes(periodic, given.ndim)
+    index = voxels.index_type(given.size)
+    spare = voxels.afford(given.shape, 4 * (out is None) + index.itemsize * return_indices + 8 * return_bounds, memory)
     goal = "other_side" if signed else target
-    voxels, turned = _readable(array, goal == "other_label", fortran=not return_indices and out is None)
+    values, turned = voxels.readable(given, goal == "other_label", fortran=not return_indices and out is None)
     if turned:
-        spacing, around = spacing[::-1], around[::-1]
+        place, around = place[..., ::-1] if isinstance(place, np.ndarray) else place[::-1], around[::-1]
     if out is not None:
-        _fits(out, array.shape)
-        if np.may_share_memory(out, voxels):
-            voxels = voxels.copy()
-    asked = (list(voxels.shape), spacing, around, goal, border, surface, spare)
-    flat = voxels.reshape(-1)
-    distance = np.empty(voxels.shape, np.float32) if out is None else out
-    sites = np.empty(voxels.shape, _site(array.size)) if return_indices else None
-    _truefield.distance_transform(
-        flat, asked, distance.reshape(-1), None if sites is None else sites.reshape(-1), threads, progress
-    )
-    if not extra:
+        _fits(out, given.shape)
+        if np.may_share_memory(out, values):
+            values = values.copy()
+    job = _Job(values, place, around, goal, border, surface, spare, threads, progress)
+    distance = np.empty(values.shape, np.float32) if out is None else out
+    sites = np.empty(values.shape, index) if return_indices else None
+    job.distance(distance, sites)
+    if not return_indices and not return_bounds:
         return distance.T if turned else distance
     lower = upper = None
     if return_bounds:
-        lower, upper = np.empty(voxels.shape, np.float32), np.empty(voxels.shape, np.float32)
-        _truefield.transform_bounds(flat, asked, lower.reshape(-1), upper.reshape(-1), threads, progress)
+        lower, upper = job.bounds(distance)
         if turned:
             lower, upper = lower.T, upper.T
     return DistanceTransform(distance.T if turned else distance, sites, lower, upper)
@@ -225,129 +271,87 @@ def voronoi(
 
     Takes 8 bytes a voxel beside the result.
     """
-    array = _image(labels)
-    spacing = _spacing(sampling, affine, array.ndim)
-    around = _periodic(periodic, array.ndim)
-    spare = _afford(array.shape, 4 + _site(array.size).itemsize + array.itemsize, memory)
-    voxels, _ = _readable(array, labels=False, fortran=False)
-    if not voxels.any():
-        return np.array(array)
-    sites = np.empty(voxels.size, _site(array.size))
-    asked = (list(voxels.shape), spacing, around, "foreground", "nothing", "centers", spare)
-    distance = np.empty(voxels.size, np.float32)
-    _truefield.distance_transform(voxels.reshape(-1), asked, distance, sites, threads, progress)
-    found: NDArray[Any] = np.ascontiguousarray(array).reshape(-1)[sites].reshape(array.shape)
+    given = voxels.array(labels)
+    place = voxels.placement(sampling, affine, given.ndim)
+    around = voxels.periodic_axes(periodic, given.ndim)
+    index = voxels.index_type(given.size)
+    spare = voxels.afford(given.shape, 4 + index.itemsize + given.itemsize, memory)
+    values, _ = voxels.readable(given, labels=False, fortran=False)
+    if not values.any():
+        return np.array(given)
+    sites = np.empty(values.shape, index)
+    job = _Job(values, place, around, "foreground", "nothing", "centers", spare, threads, progress)
+    job.distance(np.empty(values.shape, np.float32), sites)
+    found: NDArray[Any] = np.ascontiguousarray(given).reshape(-1)[sites]
     return found
 
 
-def _image(image: ArrayLike) -> NDArray[Any]:
-    array = np.asarray(image)
-    if array.dtype.kind not in "biuf":
-        raise TruefieldError(f"the image holds {array.dtype}; give booleans, whole numbers or real numbers")
-    if array.ndim == 0:
-        raise TruefieldError("the image is a single number; give an array of at least one axis")
-    return array
+@dataclass(frozen=True)
+class _Job:
+    """A transform as the core takes it."""
 
+    values: NDArray[Any]
+    place: list[float] | Floats
+    periodic: list[bool]
+    target: str
+    border: str
+    surface: str
+    memory: int
+    threads: int | None
+    progress: Progress | None
 
-def _readable(array: NDArray[Any], labels: bool, fortran: bool) -> tuple[NDArray[Any], bool]:
-    """The image as the core reads it, a copy only where it must be, and whether its axes are reversed."""
-    if array.dtype.byteorder == ">" or (array.dtype.kind == "f" and array.itemsize not in (4, 8)):
-        array = array.astype(np.float64 if array.dtype.kind == "f" else array.dtype.newbyteorder("="))
-    turned = fortran and array.flags.f_contiguous and not array.flags.c_contiguous
-    array = array.T if turned else np.ascontiguousarray(array)
-    if labels and (array.itemsize == 8 or array.dtype.kind == "f"):
-        if array.dtype.kind == "f" and np.isnan(array).any():
-            raise TruefieldError("the image holds values that are not a number; they are no labels")
-        # Zero stays zero, as it is what borders may be.
-        values, numbers = np.unique(array, return_inverse=True)
-        zero = np.searchsorted(values, 0)
-        numbers = numbers.reshape(array.shape)
-        if zero < values.size and values[zero] == 0:
-            array = np.where(numbers == zero, 0, np.where(numbers < zero, numbers + 1, numbers)).astype(np.uint32)
-        else:
-            array = (numbers + 1).astype(np.uint32)
-    if array.dtype.kind in "bi":
-        array = array.view(f"u{array.itemsize}")
-    return array, turned
+    def __post_init__(self) -> None:
+        """Refuses what only perpendicular axes can have."""
+        if isinstance(self.place, list):
+            return
+        if self.values.ndim not in (2, 3):
+            raise TruefieldError(
+                f"the affine has {self.values.ndim} axes that are not perpendicular; only 2 and 3 axes may be so"
+            )
+        if any(self.periodic) or self.border != "nothing":
+            raise TruefieldError(
+                "the axes of the affine are not perpendicular, and then the image can neither be periodic nor have a "
+                "border; tile or pad it instead"
+            )
 
+    def distance(self, out: Distances, sites: NDArray[Any] | None, surface: str | None = None) -> None:
+        """Writes distances and sites."""
+        transform = _truefield.distance_transform if isinstance(self.place, list) else _truefield.skewed_transform
+        flat = None if sites is None else sites.reshape(-1)
+        asked = self._asked(surface or self.surface)
+        transform(self.values.reshape(-1), asked, out.reshape(-1), flat, self.threads, self.progress)
 
-def _spacing(sampling: Sampling, affine: ArrayLike | None, axes: int) -> list[float]:
-    if affine is not None:
-        if sampling is not None:
-            raise TruefieldError("give sampling or affine, not both")
-        return _lengths(_matrix(affine, axes))
-    try:
-        values = np.asarray(1.0 if sampling is None else sampling, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TruefieldError(f"sampling is {sampling!r}; give a length, or one for each axis") from None
-    if values.ndim > 1 or (values.ndim == 1 and values.size != axes):
-        raise TruefieldError(
-            f"sampling has {values.size} lengths for {axes} axes; give one for each axis, or one for all"
+    def bounds(self, distance: Distances) -> tuple[Distances, Distances]:
+        """Bounds beside distances that were made before."""
+        lower, upper = np.empty(self.values.shape, np.float32), np.empty(self.values.shape, np.float32)
+        pair = lower.reshape(-1), upper.reshape(-1)
+        if isinstance(self.place, list):
+            _truefield.transform_bounds(
+                self.values.reshape(-1), self._asked(self.surface), *pair, self.threads, self.progress
+            )
+            return lower, upper
+        if self.surface != "centers":
+            distance = np.empty(self.values.shape, np.float32)
+            self.distance(distance, None, "centers")
+        asked = self._asked("centers")
+        _truefield.skewed_bounds(
+            self.values.reshape(-1), asked, distance.reshape(-1), *pair, self.threads, self.progress
         )
-    if not np.all(np.isfinite(values) & (values > 0)):
-        raise TruefieldError(f"sampling is {sampling}; give positive lengths")
-    return [float(value) for value in np.broadcast_to(values, axes)]
+        return lower, upper
 
-
-def _matrix(affine: ArrayLike, axes: int) -> Floats:
-    try:
-        matrix = np.asarray(affine, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TruefieldError("the affine is no matrix of numbers") from None
-    if matrix.shape == (axes + 1, axes + 1):
-        if not np.array_equal(matrix[axes], [0.0] * axes + [1.0]):
-            raise TruefieldError(f"the last row of the affine is {matrix[axes]}; give one that ends in zeros and a one")
-        matrix = matrix[:axes, :axes]
-    if matrix.shape != (axes, axes):
-        raise TruefieldError(
-            f"the affine has shape {matrix.shape}; an image of {axes} axes needs ({axes}, {axes}) or one more each"
-        )
-    lengths = np.linalg.norm(matrix, axis=0)
-    if not np.all(np.isfinite(matrix)) or not np.all(lengths > 0) or np.linalg.matrix_rank(matrix / lengths) < axes:
-        raise TruefieldError(
-            "the affine is singular or not finite, so voxels have no size; give one that can be inverted"
-        )
-    return matrix
-
-
-def _lengths(matrix: Floats) -> list[float]:
-    """The lengths of the columns, if they are perpendicular."""
-    lengths = np.linalg.norm(matrix, axis=0)
-    cosines = (matrix / lengths).T @ (matrix / lengths) - np.eye(len(matrix))
-    if np.abs(cosines).max() > _PERPENDICULAR:
-        raise TruefieldError(
-            "the axes of the affine are not perpendicular, so distances are not separable; resample the image first"
-        )
-    return [float(length) for length in lengths]
-
-
-def _periodic(periodic: Periodic, axes: int) -> list[bool]:
-    values = np.asarray(periodic)
-    if values.dtype != bool or values.ndim > 1 or (values.ndim == 1 and values.size != axes):
-        raise TruefieldError(f"periodic is {periodic!r}; give True or False, or one of them for each of {axes} axes")
-    return [bool(value) for value in np.broadcast_to(values, axes)]
+    def _asked(self, surface: str) -> Any:
+        shape = list(self.values.shape)
+        if isinstance(self.place, list):
+            return shape, self.place, self.periodic, self.target, self.border, surface, self.memory
+        steps = np.zeros((len(shape), 3))
+        steps[:, : len(shape)] = self.place.T
+        return shape, steps.tolist(), self.target, surface, self.memory
 
 
 def _choice(name: str, value: str, known: tuple[str, ...]) -> None:
     if value not in known:
         words = " or ".join(repr(word) for word in known)
         raise TruefieldError(f"{name} is {value!r}; choose {words}")
-
-
-def _site(voxels: int) -> np.dtype[Any]:
-    """The type of flat indices."""
-    return np.dtype(np.uint32 if voxels < 2**31 else np.uint64)
-
-
-def _afford(shape: tuple[int, ...], each: int, memory: int | None) -> int:
-    """Bytes that are left when every voxel takes so many."""
-    needed, allowed = each * int(np.prod([int(n) for n in shape], dtype=object)), arguments.memory(memory)
-    if needed > allowed:
-        raise MemoryError(
-            f"a transform of {' x '.join(map(str, shape))} voxels would need about {needed / 2**20:.1f} MiB but only "
-            f"{allowed / 2**20:.1f} MiB are allowed; transform parts of the image or allow more memory"
-        )
-    return allowed - needed
 
 
 def _fits(out: Distances, shape: tuple[int, ...]) -> None:

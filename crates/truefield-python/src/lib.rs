@@ -32,6 +32,8 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(sampled::sample_of, module)?)?;
     module.add_function(wrap_pyfunction!(transform::distance_transform, module)?)?;
     module.add_function(wrap_pyfunction!(transform::transform_bounds, module)?)?;
+    module.add_function(wrap_pyfunction!(transform::skewed_transform, module)?)?;
+    module.add_function(wrap_pyfunction!(transform::skewed_bounds, module)?)?;
     module.add_function(wrap_pyfunction!(transform::site_indices, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;

@@ -2,8 +2,8 @@
 
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
-use truefield::build::transform::{Border, Image, Measure, Target, Transform, indices};
-use truefield::{Error, Result};
+use truefield::build::transform::{Border, Image, Measure, Skewed, Target, Transform, indices};
+use truefield::{DVec3, Error, Result};
 
 use crate::door::{job, raise};
 
@@ -46,18 +46,53 @@ pub enum Indices<'py> {
     I64(PyReadwriteArray1<'py, i64>),
 }
 
+/// Runs the same call with sites of either width, or without.
+macro_rules! with_sites {
+    ($given:expr, |$sites:ident| $call:expr) => {
+        match $given {
+            None => {
+                let $sites = None::<&mut [u32]>;
+                $call
+            }
+            Some(Sites::U32(mut array)) => {
+                let $sites = Some(contiguous(array.as_slice_mut())?);
+                $call
+            }
+            Some(Sites::U64(mut array)) => {
+                let $sites = Some(contiguous(array.as_slice_mut())?);
+                $call
+            }
+        }
+    };
+}
+
 /// What is asked of a transform: shape, spacing, periodic axes, target, border, measure, memory.
 type Asked = (Vec<usize>, Vec<f64>, Vec<bool>, String, String, String, u64);
 
+/// What is asked of a transform along axes that are not perpendicular: shape, steps, target, measure, memory.
+type AskedSkewed = (Vec<usize>, Vec<[f64; 3]>, String, String, u64);
+
+fn target_of(name: &str) -> Result<Target> {
+    match name {
+        "background" => Ok(Target::Background),
+        "foreground" => Ok(Target::Foreground),
+        "other_side" => Ok(Target::OtherSide),
+        "other_label" => Ok(Target::OtherLabel),
+        other => Err(Error::invalid(format!("the target is {other:?}; choose \"background\" or \"other_label\""))),
+    }
+}
+
+fn measure_of(name: &str) -> Result<Measure> {
+    match name {
+        "centers" => Ok(Measure::Centers),
+        "between" => Ok(Measure::Between),
+        other => Err(Error::invalid(format!("the surface is {other:?}; choose \"centers\" or \"between\""))),
+    }
+}
+
 fn transform<'a>(image: Image<'a>, asked: &'a Asked) -> Result<Transform<'a>> {
     let (shape, spacing, periodic, target, border, measure, memory) = asked;
-    let target = match target.as_str() {
-        "background" => Target::Background,
-        "foreground" => Target::Foreground,
-        "other_side" => Target::OtherSide,
-        "other_label" => Target::OtherLabel,
-        other => return Err(Error::invalid(format!("the target is {other:?}; choose \"background\" or \"other_label\""))),
-    };
+    let target = target_of(target)?;
     let border = match border.as_str() {
         "nothing" => Border::Nothing,
         "background" => Border::Background,
@@ -66,11 +101,7 @@ fn transform<'a>(image: Image<'a>, asked: &'a Asked) -> Result<Transform<'a>> {
             return Err(Error::invalid(format!("the border is {other:?}; choose \"nothing\", \"background\" or \"foreground\"")));
         }
     };
-    let measure = match measure.as_str() {
-        "centers" => Measure::Centers,
-        "between" => Measure::Between,
-        other => return Err(Error::invalid(format!("the surface is {other:?}; choose \"centers\" or \"between\""))),
-    };
+    let measure = measure_of(measure)?;
     Ok(Transform { image, shape, spacing, periodic, target, border, measure, memory: *memory })
 }
 
@@ -92,17 +123,7 @@ pub fn distance_transform<'py>(
 ) -> PyResult<()> {
     let ask = transform(image.image()?, &asked).map_err(raise)?;
     let out = contiguous(out.as_slice_mut())?;
-    match sites {
-        None => job(py, threads, progress, |run| ask.distance(out, None::<&mut [u32]>, run)),
-        Some(Sites::U32(mut sites)) => {
-            let sites = contiguous(sites.as_slice_mut())?;
-            job(py, threads, progress, |run| ask.distance(out, Some(sites), run))
-        }
-        Some(Sites::U64(mut sites)) => {
-            let sites = contiguous(sites.as_slice_mut())?;
-            job(py, threads, progress, |run| ask.distance(out, Some(sites), run))
-        }
-    }
+    with_sites!(sites, |sites| job(py, threads, progress, |run| ask.distance(out, sites, run)))
 }
 
 /// Writes bounds of the distances to the surface that the image stands for.
@@ -120,6 +141,49 @@ pub fn transform_bounds<'py>(
     let ask = transform(image.image()?, &asked).map_err(raise)?;
     let (lower, upper) = (contiguous(lower.as_slice_mut())?, contiguous(upper.as_slice_mut())?);
     job(py, threads, progress, |run| ask.bounds(lower, upper, run))
+}
+
+/// Writes distances along axes that are not perpendicular and, if given room, the flat indices of the nearest sites.
+#[pyfunction]
+#[pyo3(signature = (image, asked, out, sites=None, threads=None, progress=None))]
+pub fn skewed_transform<'py>(
+    py: Python<'py>,
+    image: Voxels<'py>,
+    asked: AskedSkewed,
+    mut out: PyReadwriteArray1<'py, f32>,
+    sites: Option<Sites<'py>>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<()> {
+    let steps: Vec<_> = asked.1.iter().copied().map(DVec3::from_array).collect();
+    let ask = skewed(image.image()?, &asked, &steps).map_err(raise)?;
+    let out = contiguous(out.as_slice_mut())?;
+    with_sites!(sites, |sites| job(py, threads, progress, |run| ask.distance(out, sites, run)))
+}
+
+fn skewed<'a>(image: Image<'a>, asked: &'a AskedSkewed, steps: &'a [DVec3]) -> Result<Skewed<'a>> {
+    let (shape, _, target, measure, memory) = asked;
+    Ok(Skewed { image, shape, steps, target: target_of(target)?, measure: measure_of(measure)?, memory: *memory })
+}
+
+/// Writes bounds along axes that are not perpendicular, from the distances of centres.
+#[pyfunction]
+#[pyo3(signature = (image, asked, centres, lower, upper, threads=None, progress=None))]
+pub fn skewed_bounds<'py>(
+    py: Python<'py>,
+    image: Voxels<'py>,
+    asked: AskedSkewed,
+    centres: PyReadonlyArray1<'py, f32>,
+    mut lower: PyReadwriteArray1<'py, f32>,
+    mut upper: PyReadwriteArray1<'py, f32>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<()> {
+    let steps: Vec<_> = asked.1.iter().copied().map(DVec3::from_array).collect();
+    let ask = skewed(image.image()?, &asked, &steps).map_err(raise)?;
+    let (lower, upper) = (contiguous(lower.as_slice_mut())?, contiguous(upper.as_slice_mut())?);
+    let centres = contiguous(centres.as_slice())?;
+    job(py, threads, progress, |run| ask.bounds(centres, lower, upper, run))
 }
 
 /// Writes the index along each axis of every site.

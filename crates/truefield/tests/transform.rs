@@ -1,6 +1,7 @@
 //! Distance transforms against brute force over all pairs of voxels.
 
 use truefield::Run;
+
 use truefield::build::transform::{Border, Image, Measure, Site, Target, Transform};
 use truefield::laws::Random;
 

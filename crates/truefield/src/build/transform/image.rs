@@ -68,19 +68,23 @@ impl Image<'_> {
         }
     }
 
-    /// One bit a voxel, set where the value is not zero, for the row that begins at `start`.
-    ///
-    /// Refuses values that are not a number.
-    pub(super) fn foreground(&self, start: usize, length: usize, bits: &mut Vec<u64>) -> Result<()> {
+    /// Refuses values that are not a number, among the voxels that begin at `start`.
+    pub(super) fn check_numbers(&self, start: usize, length: usize) -> Result<()> {
         let range = start..start + length;
         let unordered = match self {
-            Self::F32(v) => v[range.clone()].iter().fold(false, |any, x| any | x.is_nan()),
-            Self::F64(v) => v[range.clone()].iter().fold(false, |any, x| any | x.is_nan()),
+            Self::F32(v) => v[range].iter().fold(false, |any, x| any | x.is_nan()),
+            Self::F64(v) => v[range].iter().fold(false, |any, x| any | x.is_nan()),
             _ => false,
         };
         if unordered {
             return Err(Error::invalid("the image holds values that are not a number; replace them, with numpy.nan_to_num for example"));
         }
+        Ok(())
+    }
+
+    /// One bit a voxel, set where the value is not zero, for the row that begins at `start`.
+    pub(super) fn foreground(&self, start: usize, length: usize, bits: &mut Vec<u64>) {
+        let range = start..start + length;
         match self {
             Self::U8(v) => pack(&v[range], |x, _| x != 0, bits),
             Self::U16(v) => pack(&v[range], |x, _| x != 0, bits),
@@ -89,7 +93,6 @@ impl Image<'_> {
             Self::F32(v) => pack(&v[range], |x, _| x != 0.0, bits),
             Self::F64(v) => pack(&v[range], |x, _| x != 0.0, bits),
         }
-        Ok(())
     }
 
     /// One bit a voxel, set where a label differs from the one before it; the first bit is clear.

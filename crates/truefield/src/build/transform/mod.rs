@@ -16,10 +16,12 @@ mod indices;
 mod panel;
 mod passes;
 mod scan;
+mod skewed;
 mod value;
 
 pub use image::Image;
 pub use indices::{Index, indices};
+pub use skewed::Skewed;
 pub use value::Site;
 
 use crate::error::{Error, Result};

@@ -40,7 +40,8 @@ impl<'a, V: Value> Scan<'a, V> {
     pub fn row<S: Site>(&mut self, start: usize, values: &mut [V], sites: Option<&mut [S]>) -> Result<()> {
         let length = values.len();
         self.cancel.check()?;
-        self.image.foreground(start, length, &mut self.bits)?;
+        self.image.check_numbers(start, length)?;
+        self.image.foreground(start, length, &mut self.bits);
         let line = Line { axis: self.axis, values, sites, start };
         match self.target {
             Target::Background => {
