@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from truefield.colours import Colour, colours_of
@@ -26,13 +28,16 @@ def font(size: float) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """A number for people: `digits` significant digits, no exponent unless it is needed, a true minus sign."""
+    """A number for people: `digits` significant digits, no exponent unless it is needed.
+
+    A negative one has a hyphen: the typeface has no minus sign.
+    """
     if not math.isfinite(value):
         return "?"
     text = f"{value:.{digits}g}"
     if "e" in text and 1e-4 <= abs(value) < 1e6:
         text = f"{value:.0f}" if abs(value) >= 1 else f"{value:.6f}".rstrip("0")
-    return text.replace("-", "\N{MINUS SIGN}")
+    return text
 
 
 def ticks(low: float, high: float, most: int = 7) -> list[float]:
@@ -60,7 +65,7 @@ def tick_labels(places: list[float]) -> list[str]:
         return [
             number(place, math.floor(math.log10(largest)) - math.floor(math.log10(step) + 1e-9) + 1) for place in places
         ]
-    return [f"{place:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for place in places]
+    return [f"{place:.{decimals}f}" for place in places]
 
 
 def write(
@@ -103,8 +108,10 @@ def colour_bar(
     span: tuple[float, float],
     size: float,
     limits: list[tuple[str, float]],
+    *,
+    paint: Callable[[NDArray[np.float64]], NDArray[np.uint8]] | None = None,
 ) -> None:
-    """An upright bar of the even map with ticks on its right and named limits on its left.
+    """An upright bar of colours with ticks on its right and named limits on its left.
 
     Args:
         image: drawn on.
@@ -112,11 +119,13 @@ def colour_bar(
         span: values at the bottom and the top.
         size: height of the text in pixels.
         limits: name and value; those outside the span are left out.
+        paint: colours (n, 3) of values (n,); the even map by default.
     """
     left, top, right, bottom = box
     draw = ImageDraw.Draw(image)
     values = span[1] + (np.arange(bottom - top) + 0.5) / (bottom - top) * (span[0] - span[1])
-    strip = np.repeat(colours_of(values, *span)[:, None, :], right - left, axis=1)
+    colours = colours_of(values, *span) if paint is None else paint(values)
+    strip = np.repeat(colours[:, None, :], right - left, axis=1)
     image.paste(Image.fromarray(np.ascontiguousarray(strip)), (left, top))
     draw.rectangle((left - 1, top - 1, right, bottom), outline=INK, width=1)
 
