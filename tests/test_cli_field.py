@@ -28,6 +28,7 @@ def test_cell_size_region_and_sign_are_kept(truefield: Command, folder: Path) ->
     words = ("--cell-size", 0.05, "--region", "inside", "--sign", "winding", "-o", folder / "a.tfield")
     truefield.done("field", folder / "blob.ply", *words)
     field = tf.load(folder / "a.tfield")
+    assert isinstance(field, tf.CompleteField)
     assert (field.cell_size, field.region, field.surface.sign) == (0.05, "inside", "winding")
     assert field.mesh.name == "blob"
 
@@ -48,6 +49,12 @@ def test_a_field_keeps_its_mesh_and_sign_rule(truefield: Command, folder: Path, 
     words = ("distance", folder / "blob.tfield", "-p", folder / "probes.npy", "-o", folder / "out.csv", *option)
     assert option[0] in truefield.refused(*words)
     assert not (folder / "out.csv").exists()
+
+
+def test_samples_are_no_part(truefield: Command, folder: Path) -> None:
+    tf.Surface(tf.read(folder / "blob.ply")).sample(resolution=5).save(folder / "samples.tfield")
+    words = ("distance", folder / "samples.tfield", "-p", folder / "probes.npy", "-o", folder / "out.csv")
+    assert "samples" in truefield.refused(*words)
 
 
 def test_a_damaged_field_is_one_sentence(truefield: Command, folder: Path) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import truefield as tf
 from solids import blob, cube
-from truefield import storage
+from truefield import container
 
 START = struct.Struct("<8sIIQ")
 
@@ -25,6 +25,12 @@ START = struct.Struct("<8sIIQ")
 def open_blob() -> tf.TriangleMesh:
     part = blob()
     return tf.TriangleMesh(part.vertices, part.triangles[:-40], "blob with a hole")
+
+
+def loaded(path: Path, threads: int | None = None) -> tf.CompleteField:
+    field = tf.load(path, threads=threads)
+    assert isinstance(field, tf.CompleteField)
+    return field
 
 
 def field_of(part: tf.TriangleMesh, **changed: Any) -> tf.CompleteField:
@@ -73,7 +79,7 @@ def forged(header: Any, arrays: bytes) -> bytes:
     """A file whose lengths and checksums are right, whatever it holds."""
     text = header if isinstance(header, bytes) else json.dumps(header).encode()
     text += b" " * (-len(text) % 8)
-    data = START.pack(storage.MARK, storage.VERSION, len(text), START.size + len(text) + 64 + len(arrays)) + text
+    data = START.pack(container.MARK, container.VERSION, len(text), START.size + len(text) + 64 + len(arrays)) + text
     data += hashlib.blake2b(data, digest_size=32).digest() + arrays
     return data + hashlib.blake2b(data, digest_size=32).digest()
 
@@ -94,7 +100,7 @@ def refused(path: Path, data: bytes, named: str = "") -> str:
 def test_loaded_equals_saved_bit_for_bit(tmp_path: Path, name: str) -> None:
     field = FIELDS[name]()
     field.save(tmp_path / "a.tfield", threads=1)
-    again = tf.load(tmp_path / "a.tfield", threads=2)
+    again = loaded(tmp_path / "a.tfield", threads=2)
     assert np.array_equal(again.mesh.vertices, field.mesh.vertices)
     assert np.array_equal(again.mesh.triangles, field.mesh.triangles)
     assert again.mesh.name == field.mesh.name
@@ -130,7 +136,7 @@ def test_the_layout_is_the_one_described(saved: bytes, tmp_path: Path) -> None:
     assert (header["sign"], header["sign_rule"], header["region"]) == ("auto", "pseudonormal", "everywhere")
     assert forged(header, arrays) == saved
     (tmp_path / "again.tfield").write_bytes(forged(header, arrays))
-    field = tf.load(tmp_path / "again.tfield")
+    field = loaded(tmp_path / "again.tfield")
     offset = 0
     for name, dtype, shape in header["arrays"]:
         assert offset % np.dtype(dtype).itemsize == 0
@@ -186,14 +192,14 @@ def test_noise_is_refused(saved: bytes, tmp_path: Path) -> None:
     generator = np.random.default_rng(13)
     for size in (1, 7, 8, 9, 23, 24, 25, 100, 1000):
         refused(tmp_path / "noise.tfield", generator.bytes(size))
-        refused(tmp_path / "noise.tfield", storage.MARK + generator.bytes(size))
+        refused(tmp_path / "noise.tfield", container.MARK + generator.bytes(size))
         refused(tmp_path / "noise.tfield", saved[:12] + generator.bytes(size))
         refused(tmp_path / "noise.tfield", saved[:24] + generator.bytes(len(saved) - 24))
 
 
 def test_a_newer_version_says_to_upgrade(saved: bytes, tmp_path: Path) -> None:
     newer = bytearray(saved)
-    newer[8:12] = struct.pack("<I", storage.VERSION + 1)
+    newer[8:12] = struct.pack("<I", container.VERSION + 1)
     sentence = refused(tmp_path / "newer.tfield", bytes(newer), "written by a newer truefield")
     assert "upgrade" in sentence
 
@@ -300,7 +306,7 @@ def test_arrays_with_good_checksums_never_crash(saved: bytes, tmp_path: Path) ->
             bad[place] = generator.integers(256)
         path.write_bytes(forged(header, bytes(bad)))
         try:
-            field = tf.load(path)
+            field = loaded(path)
         except tf.FileError:
             refusals += 1
         else:
@@ -377,3 +383,80 @@ except tf.FileError as error:
     assert ended.stdout.startswith(f"cannot write '{path}': ")
     assert ended.stdout.endswith("; choose another place\n")
     assert not list(tmp_path.iterdir())
+
+
+SAMPLED: dict[str, Callable[[], tf.SampledField]] = {
+    "exact": lambda: tf.Surface(blob()).sample(resolution=15),
+    "band": lambda: tf.Surface(blob()).sample(resolution=15, band=0.05),
+    "doubtful": lambda: tf.Surface(tf.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 1]], [[0, 1, 2]])).sample(
+        resolution=9
+    ),
+    "open": lambda: tf.Surface(open_blob()).sample(resolution=15, margin=0.1),
+    "error": lambda: tf.SampledField.from_array(
+        np.arange(24.0).reshape(2, 3, 4), (1, 2, 3), (0.1, 0.2, 0.3), error=0.5
+    ),
+    "nothing known": lambda: tf.SampledField.from_array(np.full((1, 2, 1), -np.inf)),
+    "bounds": lambda: tf.Surface(blob()).sample(resolution=15).offset(0.1),
+}
+
+
+@pytest.mark.parametrize("name", SAMPLED)
+def test_samples_come_back_with_all_that_is_known(tmp_path: Path, name: str) -> None:
+    field = SAMPLED[name]()
+    field.save(tmp_path / "a.tfield")
+    again = tf.load(tmp_path / "a.tfield")
+    assert isinstance(again, tf.SampledField)
+    for key in ("values", "lower", "upper", "origin", "spacing"):
+        assert getattr(again, key).tobytes() == getattr(field, key).tobytes()
+    points = np.random.default_rng(7).uniform(field.origin - 1, field.origin + 1, (3000, 3))
+    assert np.array(again.bounds(points)).tobytes() == np.array(field.bounds(points)).tobytes()
+    assert np.array(again.distance(points)).tobytes() == np.array(field.distance(points)).tobytes()
+    again.save(tmp_path / "b.tfield")
+    assert (tmp_path / "a.tfield").read_bytes() == (tmp_path / "b.tfield").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("kind", "adaptive"),
+        ("kind", 3),
+        ("origin", [0.0, 0.0]),
+        ("origin", [0, 0, 0]),
+        ("spacing", [0.1, 0.1, "a"]),
+        ("spacing", [0.1, 0.1, 0.0]),
+        ("spacing", [0.1, 0.1, float("nan")]),
+        ("shape", [14, 15, 15]),
+        ("shape", [0, 1, 1]),
+        ("known", "maybe"),
+        ("known", "bounds"),
+        ("length", "far"),
+        ("length", -1.0),
+        ("continuous", 1),
+    ],
+)
+def test_headers_of_samples_are_not_trusted(tmp_path: Path, key: str, value: Any) -> None:
+    SAMPLED["band"]().save(tmp_path / "a.tfield")
+    header, arrays = parts((tmp_path / "a.tfield").read_bytes())
+    refused(tmp_path / "bad.tfield", forged(header | {key: value}, arrays), "is no valid field")
+
+
+def test_samples_that_are_no_numbers_are_refused(tmp_path: Path) -> None:
+    SAMPLED["bounds"]().save(tmp_path / "a.tfield")
+    header, arrays = parts((tmp_path / "a.tfield").read_bytes())
+    refused(tmp_path / "bad.tfield", forged(header, struct.pack("<f", np.nan) + arrays[4:]), "not a number")
+    refused(tmp_path / "bad.tfield", forged(header, arrays[:-4] + struct.pack("<f", -9.0)), "between its bounds")
+
+
+def test_fields_without_a_kind_are_complete(saved: bytes, tmp_path: Path) -> None:
+    header, arrays = parts(saved)
+    del header["kind"]
+    (tmp_path / "old.tfield").write_bytes(forged(header, arrays))
+    assert loaded(tmp_path / "old.tfield").mesh.name == "blob"
+
+
+def test_damaged_samples_are_one_sentence(tmp_path: Path) -> None:
+    SAMPLED["error"]().save(tmp_path / "a.tfield")
+    good = (tmp_path / "a.tfield").read_bytes()
+    for at in range(0, len(good), 3):
+        refused(tmp_path / "bad.tfield", good[:at])
+        refused(tmp_path / "bad.tfield", good[:at] + bytes([good[at] ^ 1]) + good[at + 1 :])

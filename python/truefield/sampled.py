@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
 from truefield.errors import TruefieldError
+from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
 from truefield.volume import Volume
 
@@ -177,6 +178,18 @@ class SampledField:
             level, border, arguments.memory(memory), threads, progress
         )
         return TriangleMesh.trusted(vertices, triangles, np.array(low), np.array(high), "surface")
+
+    def save(self, path: PathLike, *, progress: Progress | None = None) -> None:
+        """Writes the field with all that is known of it to one file, a `.tfield`; `truefield.load` reads it.
+
+        The loaded field answers the same, bit for bit. `volume().write` is for other programs, which know no bounds.
+
+        Raises:
+            FileError: the file cannot be written.
+        """
+        from truefield import storage
+
+        storage.save(self, path, progress=progress)
 
     def offset(self, distance: float, *, threads: int | None = None, progress: Progress | None = None) -> SampledField:
         """The solid grown by `distance`, model units, or shrunk if it is negative.

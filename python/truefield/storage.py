@@ -1,107 +1,104 @@
-"""Complete fields in files: one versioned file, checked on loading.
+"""Fields in files: saved and loaded, they answer the same, bit for bit. `truefield.container` is the file itself.
 
-Layout of a `.tfield` file, version 1, everything little endian:
+A complete field's header has `kind` "complete" (or none), `name` of the part, `sign` that was asked for and the
+`sign_rule` it led to, `region`, and `origin`, `cell_size`, `first` and `shape` of the grid, cell (0, 0, 0) of the whole
+at `origin`, the field's first at `first`. Its arrays: `vertices` (n, 3) float64 and `mesh_triangles` (m, 3) uint32 are
+the mesh; the rest are the lists, block after block of 8 x 8 x 8 cells, x slowest, as
+`crates/truefield/src/field/parts.rs` describes them. The tree and the sign rule are made anew from the mesh on loading,
+the same each time.
 
-| bytes | what |
-| --- | --- |
-| 8 | the mark `89 54 46 49 45 4c 44 0a` (`\\x89TFIELD\\n`) |
-| 4 | version, uint32 |
-| 4 | n, the length of the header, uint32 |
-| 8 | length of the whole file, uint64 |
-| n | header: a JSON object in ASCII, padded with blanks to a multiple of 8 bytes |
-| 32 | BLAKE2b-256 of everything before |
-| | the arrays, one after another, as the header lists them: name, type, shape |
-| 32 | BLAKE2b-256 of everything before |
-
-The header's keys: `name` of the part; `sign` that was asked for and the `sign_rule` it led to; `region`; `origin`,
-`cell_size`, `first` and `shape` of the grid, cell (0, 0, 0) of the whole at `origin`, the field's first at `first`;
-`arrays`. The arrays: `vertices` (n, 3) float64 and `mesh_triangles` (m, 3) uint32 are the mesh; the rest are the lists,
-block after block of 8 x 8 x 8 cells, x slowest, as `crates/truefield/src/field/parts.rs` describes them. The tree and
-the sign rule are made anew from the mesh on loading, the same each time.
+A sampled field's header has `kind` "sampled", `origin`, `spacing` and `shape` of the lattice, `known`: how the truth is
+known, with its `length` (null: infinite): "exact" within a band, "error" of every sample, or "bounds"; and
+`continuous`: whether the sign changes at the surface only. Its arrays are flat, x slowest: the numbers of `doubtful`
+samples, `values`, `lower` and `upper` (empty but for "bounds").
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
-import stat
-import struct
-from collections.abc import Callable
-from io import BufferedReader
+from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any, Final, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truefield import _truefield
+from truefield import _truefield, container
 from truefield.arguments import Progress
+from truefield.container import Arrays, Header, Kept, expect, three
 from truefield.errors import FileError, TruefieldError
 from truefield.fields import CompleteField, Region, Sign, Surface
-from truefield.files import PathLike, check_file, replacing
+from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
+from truefield.sampled import SampledField
 
-Arrays = dict[str, NDArray[Any]]
-
-VERSION: Final = 1
-MARK: Final = b"\x89TFIELD\n"
-
-_START: Final = struct.Struct("<8sIIQ")
-_DIGEST: Final = 32
-_CHUNK: Final = 1 << 22
 # In the order of the file: large items first, so that each array is aligned.
-_ARRAYS: Final = {
-    "vertices": "<f8",
-    "mesh_triangles": "<u4",
-    "triangles": "<u4",
-    "triangle_counts": "<u2",
-    "list_counts": "<u2",
-    "ends": "<u2",
-    "cells": "<u2",
-    "wide_entries": "<u2",
-    "entries": "|u1",
-    "varied": "|u1",
+_COMPLETE: Final = {
+    "vertices": Kept("<f8", rows=True),
+    "mesh_triangles": Kept("<u4", rows=True),
+    "triangles": Kept("<u4"),
+    "triangle_counts": Kept("<u2"),
+    "list_counts": Kept("<u2"),
+    "ends": Kept("<u2"),
+    "cells": Kept("<u2"),
+    "wide_entries": Kept("<u2"),
+    "entries": Kept("|u1"),
+    "varied": Kept("|u1"),
 }
-_ROWS_OF_THREE: Final = ("vertices", "mesh_triangles")
+_SAMPLED: Final = {"doubtful": Kept("<u8"), "values": Kept("<f4"), "lower": Kept("<f4"), "upper": Kept("<f4")}
 
 
-def save(field: CompleteField, path: PathLike, *, threads: int | None = None, progress: Progress | None = None) -> None:
-    """Writes a field with its mesh to one file, for `load`; see `CompleteField.save`."""
-    check_file(path)
-    surface, mesh = field.surface, field.mesh
-    arrays: Arrays = {"vertices": mesh.vertices, "mesh_triangles": mesh.triangles}
-    arrays |= _truefield.complete_field_parts(field._native, threads, progress)
-    stored = {name: np.ascontiguousarray(arrays.pop(name), dtype) for name, dtype in _ARRAYS.items()}
-    header = {
-        "name": mesh.name,
-        "sign": surface.sign,
-        "sign_rule": surface.sign_rule.name,
-        "region": field.region,
-        "origin": field.origin.tolist(),
-        "cell_size": field.cell_size,
-        "first": list(field._native.first),
-        "shape": list(field.shape),
-        "arrays": [[name, array.dtype.str, list(array.shape)] for name, array in stored.items()],
-    }
-    text = json.dumps(header).encode("ascii")
-    text += b" " * (-len(text) % 8)
-    size = _START.size + len(text) + 2 * _DIGEST + sum(array.nbytes for array in stored.values())
-    with replacing(path) as stream:
-        writer = _Writer(stream, size, progress)
-        writer.write(_START.pack(MARK, VERSION, len(text), size))
-        writer.write(text)
-        writer.seal()
-        for array in stored.values():
-            writer.write(_bytes(array))
-        writer.seal()
+def save(
+    field: CompleteField | SampledField,
+    path: PathLike,
+    *,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Writes a field to one file, for `load`; see `CompleteField.save` and `SampledField.save`."""
+    arrays: Arrays
+    if isinstance(field, CompleteField):
+        surface, mesh = field.surface, field.mesh
+        header: Header = {
+            "kind": "complete",
+            "name": mesh.name,
+            "sign": surface.sign,
+            "sign_rule": surface.sign_rule.name,
+            "region": field.region,
+            "origin": field.origin.tolist(),
+            "cell_size": field.cell_size,
+            "first": list(field._native.first),
+            "shape": list(field.shape),
+        }
+        arrays = {"vertices": mesh.vertices, "mesh_triangles": mesh.triangles}
+        arrays |= _truefield.complete_field_parts(field._native, threads, progress)
+        kept = _COMPLETE
+    else:
+        known, length, doubtful = field._native.known
+        header = {
+            "kind": "sampled",
+            "origin": field.origin.tolist(),
+            "spacing": field.spacing.tolist(),
+            "shape": list(field.shape),
+            "known": known,
+            "length": length if np.isfinite(length) else None,
+            "continuous": field._native.continuous,
+        }
+        none = np.empty(0, np.float32)
+        bounds = (field.lower, field.upper) if known == "bounds" else (none, none)
+        arrays = {"doubtful": doubtful, "values": field.values, "lower": bounds[0], "upper": bounds[1]}
+        arrays = {name: array.reshape(-1) for name, array in arrays.items()}
+        kept = _SAMPLED
+    stored = {name: np.ascontiguousarray(arrays.pop(name), dtype) for name, (dtype, _) in kept.items()}
+    container.write(path, header, stored, progress)
 
 
-def load(path: PathLike, *, threads: int | None = None, progress: Progress | None = None) -> CompleteField:
-    """Reads a field that `CompleteField.save` wrote: the same answers, bit for bit.
+def load(
+    path: PathLike, *, threads: int | None = None, progress: Progress | None = None
+) -> CompleteField | SampledField:
+    """Reads a field that `save` wrote: a complete or a sampled one, with the same answers, bit for bit.
 
     The whole file is checked, by length, checksums and every index in it, before anything is answered. Takes no more
-    than twice the memory of the field, and the time to read the file and to make the surface's tree anew.
+    than twice the memory of the field, and the time to read the file and, for a complete field, to make the surface's
+    tree anew.
 
     Raises:
         FileError: the file cannot be read, is no such field, truncated, damaged, or from a newer truefield.
@@ -110,187 +107,80 @@ def load(path: PathLike, *, threads: int | None = None, progress: Progress | Non
     if threads is not None and threads < 1:
         raise TruefieldError(f"threads must be at least 1, or None for all cores, not {threads}")
     file = Path(path)
+    header, arrays = container.read(file, _checked, progress)
     try:
-        with file.open("rb") as stream:
-            header, arrays = _read(stream, file, progress)
-    except FileNotFoundError:
-        raise FileError(f"cannot read '{file}': there is no such file; check the name") from None
-    except IsADirectoryError:
-        raise FileError(f"cannot read '{file}': it is a folder; give the name of a file") from None
-    except FileError:
-        raise
-    except OSError as error:
-        raise FileError(f"cannot read '{file}': {(error.strerror or str(error)).lower()}") from None
-    try:
-        mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("mesh_triangles").astype(np.int64), header["name"])
-        surface = Surface(mesh, header["sign"], threads=threads, progress=progress)
-        if surface.sign_rule.name != header["sign_rule"]:
-            raise FileError(
-                f"'{file}' was built with the sign rule '{header['sign_rule']}', but this truefield chooses "
-                f"'{surface.sign_rule.name}' for its mesh; build the field again"
-            )
-        native = _truefield.complete_field_from_parts(
-            surface._native,
-            header["origin"],
-            header["cell_size"],
-            header["first"],
-            header["shape"],
-            header["region"],
-            arrays,
-            threads,
-            progress,
-        )
+        if _kind(header) == "sampled":
+            return _sampled(header, arrays)
+        return _complete(file, header, arrays, threads, progress)
     except FileError:
         raise
     except TruefieldError as error:
         raise FileError(f"'{file}' is no valid field: {error}; build the field again") from None
+
+
+def _complete(
+    file: Path, header: Header, arrays: Arrays, threads: int | None, progress: Progress | None
+) -> CompleteField:
+    mesh = TriangleMesh(arrays.pop("vertices"), arrays.pop("mesh_triangles").astype(np.int64), header["name"])
+    surface = Surface(mesh, header["sign"], threads=threads, progress=progress)
+    if surface.sign_rule.name != header["sign_rule"]:
+        raise FileError(
+            f"'{file}' was built with the sign rule '{header['sign_rule']}', but this truefield chooses "
+            f"'{surface.sign_rule.name}' for its mesh; build the field again"
+        )
+    native = _truefield.complete_field_from_parts(
+        surface._native,
+        header["origin"],
+        header["cell_size"],
+        header["first"],
+        header["shape"],
+        header["region"],
+        arrays,
+        threads,
+        progress,
+    )
     return CompleteField(native, surface)
 
 
-class _Writer:
-    """Writes and sums up what it writes."""
-
-    def __init__(self, stream: IO[bytes], size: int, progress: Progress | None) -> None:
-        self._stream, self._size, self._progress = stream, size, progress
-        self._sum = hashlib.blake2b(digest_size=_DIGEST)
-        self._done = 0
-
-    def write(self, view: bytes | memoryview) -> None:
-        for start in range(0, len(view), _CHUNK):
-            chunk = view[start : start + _CHUNK]
-            self._stream.write(chunk)
-            self._sum.update(chunk)
-            self._done += len(chunk)
-            if self._progress is not None:
-                self._progress("write field", self._done / self._size)
-
-    def seal(self) -> None:
-        self.write(self._sum.digest())
+def _sampled(header: Header, arrays: Arrays) -> SampledField:
+    shape, length = header["shape"], np.inf if header["length"] is None else header["length"]
+    counts = {name: arrays[name].size for name in ("values", "lower", "upper")}
+    whole = int(np.prod(shape, dtype=object))
+    bounds = header["known"] == "bounds"
+    if counts != {"values": whole, "lower": whole * bounds, "upper": whole * bounds}:
+        raise TruefieldError(f"its samples do not fill {shape[0]} x {shape[1]} x {shape[2]}")
+    cubes = {name: arrays[name].reshape(shape) for name, count in counts.items() if count}
+    known: dict[str, Any] = {"error": {"error": length}, "exact": {"band": length, "doubtful": arrays["doubtful"]}}.get(
+        header["known"], {}
+    )
+    continuous = header["continuous"]
+    native = _truefield.SampledField(
+        cubes.pop("values"), header["origin"], header["spacing"], **known, **cubes, continuous=continuous
+    )
+    return SampledField(native)
 
 
-class _Reader:
-    """Reads and sums up what it reads."""
-
-    def __init__(self, stream: BufferedReader, file: Path, size: int, progress: Progress | None) -> None:
-        self._stream, self._file, self._size, self._progress = stream, file, size, progress
-        self._sum = hashlib.blake2b(digest_size=_DIGEST)
-        self._done = 0
-
-    def fill(self, view: memoryview) -> None:
-        for start in range(0, len(view), _CHUNK):
-            chunk = view[start : start + _CHUNK]
-            # A buffered stream gives less only where the file ends, and the length was right a moment ago.
-            if self._stream.readinto(chunk) < len(chunk):
-                raise FileError(f"cannot read '{self._file}': it changed while it was read; try again")
-            self._sum.update(chunk)
-            self._done += len(chunk)
-            if self._progress is not None:
-                self._progress("read field", self._done / self._size)
-
-    def read(self, count: int) -> bytes:
-        data = bytearray(count)
-        self.fill(memoryview(data))
-        return bytes(data)
-
-    def check(self) -> None:
-        expected = self._sum.digest()
-        if self.read(_DIGEST) != expected:
-            raise _damaged(self._file)
+def _kind(header: Header) -> str:
+    return str(header.get("kind", "complete"))
 
 
-def _read(
-    stream: BufferedReader, file: Path, progress: Progress | None
-) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    state = os.fstat(stream.fileno())
-    if not stat.S_ISREG(state.st_mode):
-        raise FileError(f"cannot read '{file}': it is no ordinary file; give the name of a file that was saved")
-    reader = _Reader(stream, file, state.st_size, progress)
-    start = reader.read(min(state.st_size, _START.size))
-    if start[: len(MARK)] != MARK[: len(start)] or not start:
-        raise FileError(
-            f"'{file}' is not a truefield field: it does not begin as one; "
-            "give a file that CompleteField.save wrote, and meshes to truefield.read"
-        )
-    if len(start) < _START.size:
-        raise _truncated(file, state.st_size, None)
-    _, version, header_size, size = _START.unpack(start)
-    if version > VERSION:
-        raise FileError(
-            f"'{file}' was written by a newer truefield, in version {version} of the format, but this one reads "
-            f"version {VERSION}; upgrade truefield"
-        )
-    if state.st_size < size:
-        raise _truncated(file, state.st_size, size)
-    if version < 1 or state.st_size > size or _START.size + header_size + 2 * _DIGEST > size:
-        raise _damaged(file)
-    text = reader.read(header_size)
-    reader.check()
-    try:
-        header = _checked_header(text)
-    except (KeyError, TypeError, ValueError, RecursionError) as error:
-        raise FileError(f"'{file}' is no valid field: its header cannot be used ({error}); save it again") from None
-    shapes = {name: tuple(shape) for name, _, shape in header["arrays"]}
-    expected = sum(np.dtype(dtype).itemsize * _product(shapes[name]) for name, dtype in _ARRAYS.items())
-    if _START.size + header_size + 2 * _DIGEST + expected != size:
-        raise FileError(f"'{file}' is no valid field: its arrays do not fill it; save it again")
-    arrays: Arrays = {}
-    for name, dtype in _ARRAYS.items():
-        array = np.empty(shapes[name], dtype)
-        reader.fill(_bytes(array))
-        arrays[name] = array.astype(array.dtype.newbyteorder("="), copy=False)
-    reader.check()
-    return header, arrays
-
-
-def _checked_header(text: bytes) -> dict[str, Any]:
-    """The header, if each of its values is of the kind it must be; else an error that says what is not."""
-    header = json.loads(text.decode("ascii"))
-    if not isinstance(header, dict):
-        raise TypeError("it is no object")
-    _expect(header, "name", lambda name: isinstance(name, str))
-    _expect(header, "sign", lambda sign: sign in get_args(Sign))
-    _expect(header, "sign_rule", lambda rule: isinstance(rule, str))
-    _expect(header, "region", lambda region: region in get_args(Region))
-    _expect(header, "origin", lambda origin: _three(origin, float))
-    _expect(header, "cell_size", lambda size: isinstance(size, float))
-    _expect(header, "first", lambda first: _three(first, int) and all(abs(i) < 2**62 for i in first))
-    _expect(header, "shape", lambda shape: _three(shape, int) and all(0 < n < 2**32 for n in shape))
-    _expect(header, "arrays", lambda arrays: isinstance(arrays, list) and len(arrays) == len(_ARRAYS))
-    for entry, (name, dtype) in zip(header["arrays"], _ARRAYS.items(), strict=True):
-        rows = 2 if name in _ROWS_OF_THREE else 1
-        given_name, given_dtype, shape = entry
-        lengths = isinstance(shape, list) and len(shape) == rows and all(type(n) is int and n >= 0 for n in shape)
-        if (given_name, given_dtype) != (name, dtype) or not lengths or (rows == 2 and shape[1] != 3):
-            raise ValueError(f"arrays lists {entry} where {name}, {dtype} and its shape belong")
-    return header
-
-
-def _expect(header: dict[str, Any], key: str, good: Callable[[Any], bool]) -> None:
-    if key not in header:
-        raise ValueError(f"it has no {key}")
-    if not good(header[key]):
-        raise ValueError(f"{key} is {header[key]!r:.80}")
-
-
-def _three(value: Any, kind: type) -> bool:
-    return isinstance(value, list) and len(value) == 3 and all(type(item) is kind for item in value)
-
-
-def _bytes(array: NDArray[Any]) -> memoryview:
-    return array.reshape(-1).view(np.uint8).data
-
-
-def _product(shape: tuple[int, ...]) -> int:
-    count = 1
-    for length in shape:
-        count *= length
-    return count
-
-
-def _truncated(file: Path, size: int, expected: int | None) -> FileError:
-    whole = "" if expected is None else f" of {expected}"
-    return FileError(f"'{file}' is truncated: it has only {size}{whole} bytes; copy it again or build the field again")
-
-
-def _damaged(file: Path) -> FileError:
-    return FileError(f"'{file}' is damaged: its checksum does not match; copy it again or build the field again")
+def _checked(header: Header) -> Mapping[str, Kept]:
+    """The arrays of the kind of field that the header names, if each of its values is as it must be."""
+    kind = _kind(header)
+    if kind not in ("complete", "sampled"):
+        raise ValueError(f"kind is {kind!r:.80}")
+    expect(header, "origin", lambda origin: three(origin, float))
+    expect(header, "shape", lambda shape: three(shape, int) and all(0 < n < 2**32 for n in shape))
+    if kind == "sampled":
+        expect(header, "spacing", lambda spacing: three(spacing, float))
+        expect(header, "known", lambda known: known in ("exact", "error", "bounds"))
+        expect(header, "length", lambda length: length is None or isinstance(length, float))
+        expect(header, "continuous", lambda continuous: isinstance(continuous, bool))
+        return _SAMPLED
+    expect(header, "name", lambda name: isinstance(name, str))
+    expect(header, "sign", lambda sign: sign in get_args(Sign))
+    expect(header, "sign_rule", lambda rule: isinstance(rule, str))
+    expect(header, "region", lambda region: region in get_args(Region))
+    expect(header, "cell_size", lambda size: isinstance(size, float))
+    expect(header, "first", lambda first: three(first, int) and all(abs(i) < 2**62 for i in first))
+    return _COMPLETE

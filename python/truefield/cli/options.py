@@ -79,7 +79,10 @@ def ready(
     if weld is not None or sign is not Sign.AUTO:
         option = "--sign" if weld is None else "--weld"
         raise tf.TruefieldError(f"'{part}' is a field, built with its own mesh and sign rule; leave {option} out")
-    return tf.load(part, threads=threads, progress=report)
+    field = tf.load(part, threads=threads, progress=report)
+    if isinstance(field, tf.SampledField):
+        raise tf.TruefieldError(f"'{part}' holds samples of distances only; give a mesh or a complete field")
+    return field
 
 
 def load(part: Path, weld: float | None) -> TriangleMesh:
