@@ -9,6 +9,7 @@ from truefield.fields import CompleteField, Nearest, SignRule, Surface, complete
 from truefield.io import read, read_points
 from truefield.mesh import TriangleMesh
 from truefield.sampled import SampledField
+from truefield.sampling import Voxels, sampled_field, voxelize
 from truefield.storage import load
 from truefield.thickness import ThicknessReport, thickness
 from truefield.transform import DistanceTransform, distance_transform, voronoi
@@ -28,6 +29,7 @@ __all__ = [
     "TriangleMesh",
     "TruefieldError",
     "Volume",
+    "Voxels",
     "__version__",
     "complete_field",
     "distance_transform",
@@ -35,7 +37,9 @@ __all__ = [
     "read",
     "read_points",
     "read_volume",
+    "sampled_field",
     "shapes",
     "thickness",
     "voronoi",
+    "voxelize",
 ]

@@ -22,13 +22,18 @@ __all__ = [
     "complete_field_parts",
     "contour",
     "distance_transform",
+    "march",
     "sample",
+    "sample_marched",
+    "site_difference",
     "site_indices",
     "skewed_bounds",
     "skewed_transform",
     "thickness",
     "transform_bounds",
+    "voxelize",
     "walls_at",
+    "wavefront",
 ]
 
 __version__: str
@@ -294,6 +299,45 @@ def sample(
     threads: int | None = None,
     progress: _Progress = None,
 ) -> SampledField: ...
+def sample_marched(
+    surface: Surface,
+    origin: list[float],
+    spacing: float,
+    shape: tuple[int, int, int],
+    band: float | None,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> SampledField: ...
+def voxelize(
+    surface: Surface,
+    origin: list[float],
+    spacing: float,
+    shape: tuple[int, int, int],
+    rule: str,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[NDArray[np.bool_], NDArray[np.uint64], NDArray[np.int64], _Floats, int]: ...
+def wavefront(
+    sites: NDArray[np.bool_],
+    shape: list[int],
+    sampling: list[float],
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint64]]: ...
+def march(
+    sites: NDArray[np.bool_], shape: list[int], sampling: list[float], memory: int, progress: _Progress = None
+) -> tuple[NDArray[np.uint32], NDArray[np.float32]]: ...
+def site_difference(
+    marched: NDArray[np.uint32],
+    exact: NDArray[np.uint32],
+    shape: list[int],
+    sampling: list[float],
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[int, float]: ...
 def contour(
     surface: Surface,
     distance: float,

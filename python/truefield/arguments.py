@@ -66,6 +66,22 @@ def shape(counts: Floats, step: float) -> tuple[int, int, int]:
     return x, y, z
 
 
+def lattice(
+    low: Floats, high: Floats, resolution: int | None, spacing: float | None, margin: float
+) -> tuple[list[float], float, tuple[int, int, int]]:
+    """Origin, spacing and shape of a lattice over a box, by default 256 points along its longest side."""
+    low, high = low - length("margin", margin, least=0.0), high + margin
+    if resolution is not None and spacing is not None:
+        raise TruefieldError("give resolution or spacing, not both")
+    if spacing is None:
+        points = count("resolution", 256 if resolution is None else resolution, least=2)
+        spacing = float(np.max(high - low)) / (points - 1)
+    step = length("spacing", spacing)
+    counts = shape((high - low) / step + 1.0, step)
+    origin = (low + high) / 2 - (np.asarray(counts) - 1) * step / 2
+    return origin.tolist(), step, counts
+
+
 def memory(memory: int | None) -> int:
     """Bytes that a job may take; half the machine's memory by default."""
     if memory is not None:

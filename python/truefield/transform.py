@@ -22,11 +22,14 @@ from truefield.voxels import Periodic, Sampling
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+if TYPE_CHECKING:
+    from truefield.marching import Farther
+
 Distances = NDArray[np.float32]
 Placing = Literal["centers", "between"]
 Target = Literal["background", "other_label"]
 Border = Literal["nothing", "background", "foreground"]
-Method = Literal["exact"]
+Method = Literal["exact", "wavefront", "marching"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +43,8 @@ class DistanceTransform(NDArrayOperatorsMixin):
             the border is nearest. None unless indices were asked for.
         lower: float32, never above the true distance. None unless bounds were asked for.
         upper: float32, never below the true distance. None unless bounds were asked for.
-        passes: passes over the image until nothing changed. None for the exact method.
-        changed: voxels that changed in each pass. None for the exact method.
+        passes: passes of the wavefront that changed something, on either side of a signed one. None for other methods.
+        changed: (passes,) voxels that each of them changed. None for other methods.
     """
 
     distance: Distances
@@ -93,6 +96,29 @@ class DistanceTransform(NDArrayOperatorsMixin):
         plain = [x.distance if isinstance(x, DistanceTransform) else x for x in inputs]
         return getattr(ufunc, method)(*plain, **options)
 
+    def farther_than(
+        self,
+        exact: DistanceTransform,
+        sampling: Sampling = None,
+        *,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> Farther:
+        """How many voxels have a site farther than in the exact transform of the same image, and by how much.
+
+        Args:
+            exact: the same transform with method="exact". Both need indices.
+            sampling: as it was given to both.
+            threads: worker threads.
+            progress: called as `progress(phase, fraction)`.
+
+        Raises:
+            TruefieldError: there are no indices, the images differ, or `exact` holds sites that are not the nearest.
+        """
+        from truefield import marching
+
+        return marching.farther(self, exact, sampling, threads, progress)
+
 
 class _Options(TypedDict, total=False):
     """What does not decide the type of the result."""
@@ -119,6 +145,15 @@ def distance_transform(
     return_bounds: Literal[False] = ...,
     **options: Unpack[_Options],
 ) -> Distances: ...
+@overload
+def distance_transform(
+    image: ArrayLike,
+    *,
+    method: Literal["wavefront", "marching"],
+    return_indices: bool = ...,
+    return_bounds: bool = ...,
+    **options: Unpack[_Options],
+) -> DistanceTransform: ...
 @overload
 def distance_transform(
     image: ArrayLike,
@@ -179,7 +214,8 @@ def distance_transform(
         periodic: whether the image goes on with its other end, for all axes or for each.
         border: what lies beyond the image along axes that are not periodic: "nothing" to be near to, "background", or
             "foreground". With "other_label", "foreground" is a label of its own.
-        method: "exact".
+        method: "exact"; "wavefront": rings of voxels pass on where their nearest site is, as in *Bounded distance
+            transforms of trimmed NURBS*; "marching": voxels do so in the order of their distance. See below.
         return_indices: also find which voxel is nearest.
         return_bounds: also enclose the distance to the surface that the voxels stand for: see below.
         out: C-contiguous float32 array of the image's shape to write into; `distance` is then this array.
@@ -204,13 +240,19 @@ def distance_transform(
     farther from the distance of centres than half a diagonal of a voxel, or three halves towards the surface if signed,
     and along axes that are not perpendicular just as far.
 
+    A wavefront finds the same distances: its passes are in step, which makes it exact, and there are fewer of them than
+    voxels along the longest axis. In the order of distance some voxels keep a site slightly farther than the nearest;
+    `DistanceTransform.farther_than` counts them. Both take 1 to 3 axes, from centre to centre, none periodic, and
+    nothing beyond the border. A wavefront takes 18 to 22 bytes a voxel and 16 to 24 for each that a pass changes; a
+    march, on one thread, takes 16 and 16 for each trial. They give a `DistanceTransform`.
+
     Saito and Toriwaki 1994 and Felzenszwalb and Huttenlocher 2012 show that squared distances are separable.
 
     Raises:
         TruefieldError: an argument cannot be used, or the image holds NaN.
         MemoryError: the result would not fit the budget.
     """
-    _choice("method", method, ("exact",))
+    _choice("method", method, ("exact", "wavefront", "marching"))
     _choice("surface", surface, ("centers", "between"))
     _choice("target", target, ("background", "other_label"))
     _choice("border", border, ("nothing", "background", "foreground"))
@@ -219,6 +261,16 @@ def distance_transform(
             "labels have no inside, so signed distances need target='background'; leave one of them out"
         )
     given = voxels.array(image)
+    if out is not None:
+        _fits(out, given.shape)
+    if method != "exact":
+        from truefield import marching
+
+        return marching.transform(
+            given, sampling=sampling, affine=affine, signed=signed, surface=surface, target=target, periodic=periodic,
+            border=border, method=method, return_indices=return_indices, return_bounds=return_bounds, out=out,
+            memory=memory, threads=threads, progress=progress,
+        )  # fmt: skip
     place = voxels.placement(sampling, affine, given.ndim)
     around = voxels.periodic_axes(periodic, given.ndim)
     index = voxels.index_type(given.size)
@@ -227,10 +279,8 @@ def distance_transform(
     values, turned = voxels.readable(given, goal == "other_label", fortran=not return_indices and out is None)
     if turned:
         place, around = place[..., ::-1] if isinstance(place, np.ndarray) else place[::-1], around[::-1]
-    if out is not None:
-        _fits(out, given.shape)
-        if np.may_share_memory(out, values):
-            values = values.copy()
+    if out is not None and np.may_share_memory(out, values):
+        values = values.copy()
     job = _Job(values, place, around, goal, border, surface, spare, threads, progress)
     distance = np.empty(values.shape, np.float32) if out is None else out
     sites = np.empty(values.shape, index) if return_indices else None

@@ -8,6 +8,7 @@ mod contour;
 mod convert;
 mod door;
 mod field;
+mod marching;
 mod render;
 mod sampled;
 mod store;
@@ -35,6 +36,11 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(transform::skewed_transform, module)?)?;
     module.add_function(wrap_pyfunction!(transform::skewed_bounds, module)?)?;
     module.add_function(wrap_pyfunction!(transform::site_indices, module)?)?;
+    module.add_function(wrap_pyfunction!(marching::voxels_of, module)?)?;
+    module.add_function(wrap_pyfunction!(marching::marched_samples_of, module)?)?;
+    module.add_function(wrap_pyfunction!(marching::wavefront_from, module)?)?;
+    module.add_function(wrap_pyfunction!(marching::march_from, module)?)?;
+    module.add_function(wrap_pyfunction!(marching::site_difference_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     Ok(())
