@@ -40,6 +40,15 @@ def test_samples_are_the_library_s(truefield: Command, folder: Path) -> None:
     np.testing.assert_array_equal(tf.read_volume(upper).values, field.upper)
 
 
+def test_a_wavefront_has_its_bounds(truefield: Command, folder: Path) -> None:
+    lower, upper = folder / "lower.npz", folder / "upper.npz"
+    words = ("--resolution", 17, "--method", "wavefront", "--lower", lower, "--upper", upper)
+    truefield.done("sample", folder / "blob.ply", *words, "-o", folder / "a.vti")
+    field = tf.sampled_field(tf.read(folder / "blob.ply"), 17, method="wavefront")
+    for file, array in (("a.vti", field.values), ("lower.npz", field.lower), ("upper.npz", field.upper)):
+        np.testing.assert_array_equal(tf.read_volume(folder / file).values, array)
+
+
 def test_a_part_becomes_samples_and_a_mesh_again(truefield: Command, folder: Path) -> None:
     truefield.done("sample", folder / "blob.ply", "--spacing", 0.02, "--margin", 0.1, "-o", folder / "a.nrrd")
     said = truefield.done("surface", folder / "a.nrrd", "-o", folder / "a.stl")

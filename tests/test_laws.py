@@ -373,7 +373,7 @@ def test_arguments_that_cannot_be_are_refused() -> None:
 @pytest.mark.parametrize("name", ["cube", "torus", "soup"])
 @pytest.mark.parametrize("distance", [-0.1, 0.15])
 @pytest.mark.parametrize("placement", ["lattice", "projected"])
-def test_contours_keep_both_guarantees(name: str, distance: float, placement: tf.fields.Placement) -> None:
+def test_contours_keep_both_guarantees(name: str, distance: float, placement: tf.sampled.Placement) -> None:
     mesh, tolerance = ALL[name], 0.06
     surface = tf.Surface(mesh, "auto" if name in CLOSED else "unsigned")
     distance = distance if name in CLOSED else abs(distance)

@@ -197,3 +197,38 @@ def test_surfaces_that_cannot_be_are_one_sentence(field: tf.SampledField) -> Non
         field.surface(border="none")  # type: ignore[arg-type]
     with pytest.raises(MemoryError):
         field.surface(memory=100)
+
+
+def test_contours_carry_their_bounds(field: tf.SampledField) -> None:
+    for placement in ("lattice", "projected"):
+        cloud = field.contour(-0.1, 0.02, placement=placement)
+        assert len(cloud) > 1000
+        assert np.abs(field.distance(cloud.points) + 0.1).max() <= 0.01 * (1 + 1e-9)
+        truth = ball(cloud.points)
+        lower, upper = (np.asarray(cloud.scalars[name], float) for name in ("lower", "upper"))
+        assert np.all((lower <= truth) & (truth <= upper))
+        np.testing.assert_allclose(np.linalg.norm(np.asarray(cloud.normals), axis=1), 1.0)
+    assert len(field.contour(9.0, 0.1)) == 0
+    with pytest.raises(tf.TruefieldError, match="tolerance"):
+        field.contour(0.0, 0.0)
+    with pytest.raises(tf.TruefieldError, match="placement"):
+        field.contour(0.0, 0.1, placement="anywhere")  # type: ignore[arg-type]
+    with pytest.raises(MemoryError):
+        field.contour(0.0, 0.01, memory=1000)
+
+
+def test_the_medial_axis_of_a_wall_is_its_middle() -> None:
+    x, y, z = np.meshgrid(*(np.arange(n) * 0.1 for n in (41, 31, 21)), indexing="ij")
+    wall = tf.SampledField.from_array(np.abs(y - 1.52) - 0.9 + 0.0 * (x + z), spacing=0.1)
+    middle = wall.medial_axis()
+    assert len(middle) == 41 * 21
+    np.testing.assert_allclose(middle.points[:, 1], 1.55)
+    np.testing.assert_allclose(np.asarray(middle.scalars["radius"], float), 0.85, atol=1e-6)
+    np.testing.assert_allclose(np.asarray(middle.scalars["angle"], float), 180.0, atol=1e-3)
+    assert len(wall.medial_axis("outside")) == 0
+    assert len((~wall).medial_axis("outside")) == len(middle)
+    for bad in (0, 200):
+        with pytest.raises(tf.TruefieldError, match="angle"):
+            wall.medial_axis(angle=bad)
+    with pytest.raises(tf.TruefieldError, match="side"):
+        wall.medial_axis("between")  # type: ignore[arg-type]

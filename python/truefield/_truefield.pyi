@@ -197,6 +197,18 @@ class SampledField:
         threads: int | None = None,
         progress: _Progress = None,
     ) -> tuple[_Floats, NDArray[np.int64], list[float], list[float]]: ...
+    def contour(
+        self,
+        distance: float,
+        tolerance: float,
+        placement: str,
+        memory: int,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> tuple[_Floats, _Floats, _Floats, _Floats]: ...
+    def medial_axis(
+        self, side: str, angle: float, threads: int | None = None, progress: _Progress = None
+    ) -> tuple[_Floats, _Floats, _Floats]: ...
     def resample(
         self,
         origin: list[float],

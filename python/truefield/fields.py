@@ -18,11 +18,10 @@ from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
-from truefield.sampled import SampledField
+from truefield.sampled import Placement, SampledField
 
 Sign = Literal["auto", "pseudonormal", "winding", "unsigned"]
 Region = Literal["everywhere", "inside"]
-Placement = Literal["lattice", "projected"]
 Part = Union[TriangleMesh, "Surface"]
 
 

@@ -12,12 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
+from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
 from truefield.volume import Volume
 
 Border = Literal["closed", "open"]
+Placement = Literal["lattice", "projected"]
+Side = Literal["inside", "outside"]
 
 
 class SampledField:
@@ -178,6 +181,71 @@ class SampledField:
             level, border, arguments.memory(memory), threads, progress
         )
         return TriangleMesh.trusted(vertices, triangles, np.array(low), np.array(high), "surface")
+
+    def contour(
+        self,
+        distance: float,
+        tolerance: float,
+        *,
+        placement: Placement = "lattice",
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> PointCloud:
+        """Samples the places where the interpolation is at signed `distance`.
+
+        Args:
+            distance: model units, negative inside.
+            tolerance: E: the interpolation at each point is within E/2 of `distance`, and each place where it is
+                `distance` is within E/2 of a point.
+            placement: "lattice" keeps the centres of parts of cells; "projected" moves each point onto the contour
+                unless that is in another cell; each place of the contour is then within E of a point.
+            memory: refuse to take more bytes than this; half the machine's memory by default.
+            threads: worker threads; neither points nor their order depend on it.
+            progress: called as `progress(phase, fraction)`.
+
+        The scalars `lower` and `upper` of each point hold the true distance there. 64 bytes a point.
+
+        Raises:
+            TruefieldError: the distance or tolerance cannot be used.
+            MemoryError: the contour has more points than fit.
+        """
+        points, normals, lower, upper = self._native.contour(
+            arguments.number("distance", distance),
+            arguments.length("tolerance", tolerance),
+            placement,
+            arguments.memory(memory),
+            threads,
+            progress,
+        )
+        return PointCloud(points, normals, scalars={"lower": lower, "upper": upper})
+
+    def medial_axis(
+        self,
+        side: Side = "inside",
+        *,
+        angle: float = 60.0,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> PointCloud:
+        """The places between samples where the nearest point of the surface jumps.
+
+        Args:
+            side: "inside": the centres of the largest balls that fit into the solid; "outside": around it.
+            angle: degrees: how far apart the two nearest points must at least be seen from there. Wide angles keep the
+                middles of walls, small ones also the creases that run into corners.
+            threads: worker threads; the result never depends on it.
+            progress: called as `progress(phase, fraction)`.
+
+        Points lie on the middles of edges of the lattice; their scalars are `radius`, the distance to the surface, and
+        `angle`. They are within about three spacings of the medial axis, one and a half where the surface is flat: a
+        measure, not a bound. Within two spacings of the surface nothing is found, nor beyond a band.
+
+        Raises:
+            TruefieldError: the side or angle cannot be used.
+        """
+        points, radii, angles = self._native.medial_axis(side, arguments.number("angle", angle), threads, progress)
+        return PointCloud(points, scalars={"radius": radii, "angle": angles})
 
     def save(self, path: PathLike, *, progress: Progress | None = None) -> None:
         """Writes the field with all that is known of it to one file, a `.tfield`; `truefield.load` reads it.

@@ -11,6 +11,15 @@ use crate::surface::PySurface;
 
 type Points<'py> = Bound<'py, PyArray2<f64>>;
 
+/// The placement that a name stands for.
+pub fn placement(name: &str) -> PyResult<Placement> {
+    match name {
+        "lattice" => Ok(Placement::Lattice),
+        "projected" => Ok(Placement::Projected),
+        _ => Err(raise(Error::invalid(format!("placement is {name:?}; choose \"lattice\" or \"projected\"")))),
+    }
+}
+
 /// `(points, normals, triangle)` of the contour at signed `distance`.
 #[pyfunction]
 #[pyo3(name = "contour", signature = (surface, distance, tolerance, placement, memory, threads=None, progress=None))]
@@ -24,11 +33,7 @@ pub fn contour_of<'py>(
     threads: Option<usize>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Points<'py>, Points<'py>, Bound<'py, PyArray1<i64>>)> {
-    let placement = match placement {
-        "lattice" => Placement::Lattice,
-        "projected" => Placement::Projected,
-        _ => return Err(raise(Error::invalid(format!("placement is {placement:?}; choose \"lattice\" or \"projected\"")))),
-    };
+    let placement = self::placement(placement)?;
     let found = job(py, threads, progress, |run| contour(&surface.0, distance, tolerance, placement, memory, run))?;
     let triangles = column(py, found.triangles.into_iter().map(i64::from));
     Ok((rows(py, found.points.into_iter())?, rows(py, found.normals.into_iter())?, triangles))

@@ -9,6 +9,8 @@ use truefield::build::sampled::sample;
 use truefield::op::boolean::{complement, difference, intersection, union};
 use truefield::op::offset::offset;
 use truefield::op::resample::resample;
+use truefield::product::medial::{Where, medial_axis};
+use truefield::product::sampled::contour;
 use truefield::product::surface::{Border, Triangulation, triangulate};
 use truefield::{Continuity, DVec3, Error, Grid, Known, Lattice, Run, SampledField};
 
@@ -18,7 +20,8 @@ use crate::surface::{PySurface, interval_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 type Volume<'py> = Bound<'py, PyArray3<f32>>;
-type MeshArrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, [f64; 3], [f64; 3]);
+type Points<'py> = Bound<'py, PyArray2<f64>>;
+type MeshArrays<'py> = (Points<'py>, Bound<'py, PyArray2<i64>>, [f64; 3], [f64; 3]);
 
 /// Samples on a lattice; see `truefield.SampledField`.
 #[pyclass(name = "SampledField", module = "truefield._truefield", frozen)]
@@ -176,7 +179,7 @@ impl PySampledField {
         points: PyReadonlyArray2<'py, f64>,
         threads: Option<usize>,
         progress: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Points<'py>> {
         let points = self::points(&points)?;
         rows(py, job(py, threads, progress, |run| self.0.gradients(&points, run))?.into_iter())
     }
@@ -235,6 +238,43 @@ impl PySampledField {
         let vertices = vertices.into_flattened().into_pyarray(py).reshape([vertex_count, 3])?;
         let triangles = triangles.into_flattened().into_pyarray(py).reshape([triangle_count, 3])?;
         Ok((vertices, triangles, extent.min.to_array(), extent.max.to_array()))
+    }
+
+    /// `(points, normals, lower, upper)` of the contour at signed `distance`.
+    #[pyo3(signature = (distance, tolerance, placement, memory, threads=None, progress=None))]
+    fn contour<'py>(
+        &self,
+        py: Python<'py>,
+        distance: f64,
+        tolerance: f64,
+        placement: &str,
+        memory: u64,
+        threads: Option<usize>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Points<'py>, Points<'py>, Floats<'py>, Floats<'py>)> {
+        let placement = crate::contour::placement(placement)?;
+        let found = job(py, threads, progress, |run| contour(&self.0, distance, tolerance, placement, memory, run))?;
+        let (lower, upper) = interval_arrays(py, &found.bounds);
+        Ok((rows(py, found.points.into_iter())?, rows(py, found.normals.into_iter())?, lower, upper))
+    }
+
+    /// `(points, radii, angles)` of the medial axis.
+    #[pyo3(signature = (side, angle, threads=None, progress=None))]
+    fn medial_axis<'py>(
+        &self,
+        py: Python<'py>,
+        side: &str,
+        angle: f64,
+        threads: Option<usize>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<(Points<'py>, Floats<'py>, Floats<'py>)> {
+        let side = match side {
+            "inside" => Where::Inside,
+            "outside" => Where::Outside,
+            _ => return Err(raise(Error::invalid(format!("side is {side:?}; choose \"inside\" or \"outside\"")))),
+        };
+        let found = job(py, threads, progress, |run| medial_axis(&self.0, side, angle, run))?;
+        Ok((rows(py, found.points.into_iter())?, column(py, found.radii.into_iter()), column(py, found.angles.into_iter())))
     }
 
     #[pyo3(signature = (origin, spacing, shape, memory, threads=None, progress=None))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +10,13 @@ import typer
 
 from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, Written, ready
 from truefield.cli.progress import progress
+
+
+class Method(str, Enum):
+    """How samples are found."""
+
+    EXACT = "exact"
+    WAVEFRONT = "wavefront"
 
 
 def sample(
@@ -26,6 +34,9 @@ def sample(
         float | None,
         typer.Option("--band", show_default="none", help="Cut distances off beyond this, plus and minus; quicker."),
     ] = None,
+    method: Annotated[
+        Method, typer.Option("--method", help="`exact`, or a `wavefront` from the voxels that the surface touches.")
+    ] = Method.EXACT,
     margin: Annotated[
         float, typer.Option("--margin", help="How far samples go beyond the box of the part, in model units.")
     ] = 0.0,
@@ -41,7 +52,7 @@ def sample(
 ) -> None:
     """The distances of a part on a lattice, for programs that want a volume.
 
-    Each sample is exact and rounded to single precision, negative inside.
+    Each sample is exact and rounded to single precision, negative inside; a wavefront's are within their bounds.
     """
     import numpy as np
 
@@ -54,7 +65,16 @@ def sample(
             volume.check(path, one)
     with progress() as report:
         surface = ready(part, weld, sign, threads, report)
-        field = surface.sample(resolution, spacing, band=band, margin=margin, threads=threads, progress=report)
+        field = tf.sampled_field(
+            surface,
+            resolution,
+            spacing,
+            band=band,
+            method=method.value,
+            margin=margin,
+            threads=threads,
+            progress=report,
+        )
     made = field.volume()
     made.write(output)
     for path, bound in ((lower, "lower"), (upper, "upper")):
