@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from bench import alone, models, peers, process, table
+from bench import alone, models, peers, process, table, transforms
 from bench.compare import compare
 from bench.settings import Settings
 
 COMPARED = ("dense", "winding", "band", "uniform", "near")
-ALL = (*COMPARED, *alone.JOBS)
+ALL = (*COMPARED, *alone.JOBS, *transforms.JOBS)
 
 
 def main() -> None:
@@ -29,7 +29,7 @@ def main() -> None:
     tools = _chosen("tool", arguments.tools, tuple(peers.ALL))
     settings = Settings(
         resolution=arguments.resolution, queries=arguments.queries, repeats=arguments.repeats,
-        threads=arguments.threads, timeout=arguments.timeout, tools=tools,
+        threads=arguments.threads, volume=arguments.volume, timeout=arguments.timeout, tools=tools,
     )  # fmt: skip
     folder = Path(arguments.output)
     folder.mkdir(parents=True, exist_ok=True)
@@ -47,7 +47,8 @@ def main() -> None:
         stem.with_suffix(".json").write_text(json.dumps(numbers, indent=1))
         stem.with_suffix(".md").write_text("\n".join(report))
 
-    for mesh in models.models(arguments.models, arguments.only.split(",") if arguments.only else []):
+    meshes = models.models(arguments.models, arguments.only.split(",") if arguments.only else [])
+    for mesh in meshes if set(jobs) & {*COMPARED, *alone.WITH_MODEL} else ():
         vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles, dtype=np.int64)
         for job in jobs:
             if job in COMPARED:
@@ -84,6 +85,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--jobs", help=f"comma separated, of {', '.join(ALL)} (default: all)")
     parser.add_argument("--tools", help=f"comma separated, of {', '.join(peers.ALL)} (default: all)")
     parser.add_argument("--resolution", type=int, default=256, help="samples along the longest side (default: 256)")
+    parser.add_argument("--volume", type=int, default=512, help="voxels a side of transformed volumes (default: 512)")
     parser.add_argument("--queries", type=int, default=1_000_000, help="random points (default: a million)")
     parser.add_argument("--repeats", type=int, default=3, help="rounds of which the median counts (default: 3)")
     parser.add_argument("--threads", type=int, default=min(2, os.cpu_count() or 1), help="for every tool (default: 2)")

@@ -44,14 +44,14 @@ def run(task: dict[str, Any], folder: Path, timeout: float) -> dict[str, Any]:
 
 
 def table(job: str, settings: Settings, model: str = "", *mesh: NDArray[Any]) -> dict[str, Any]:
-    """A job that only truefield does, on a mesh if it takes one."""
+    """A job that makes its own table, on a mesh if it takes one."""
     with tempfile.TemporaryDirectory(prefix="truefield-bench-") as text:
         folder = Path(text)
         if mesh:
             np.savez(folder / "mesh.npz", vertices=mesh[0], triangles=mesh[1])
         task = {
             "job": job, "mesh": str(folder / "mesh.npz") if mesh else None,
-            "threads": settings.threads, "repeats": settings.repeats,
+            "threads": settings.threads, "repeats": settings.repeats, "volume": settings.volume,
         }  # fmt: skip
         made = run(task, folder, settings.timeout)
         return made | {"job": job, "model": f"{model}: " if model else ""}

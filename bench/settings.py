@@ -13,5 +13,6 @@ class Settings:
     queries: int = 1_000_000
     repeats: int = 3
     threads: int = 2
+    volume: int = 512
     timeout: float = 1800.0
     tools: list[str] = field(default_factory=list)
