@@ -182,6 +182,7 @@ fn what_cannot_be_asked_is_refused() {
     refused(Skewed { steps: &[DVec3::X], ..case.ask() }, "axes");
     refused(Skewed { shape: &[12], steps: &[DVec3::X], ..case.ask() }, "axes");
     refused(Skewed { shape: &[3, 5], ..case.ask() }, "shape");
+    refused(Skewed { shape: &[1 << 30, 0], ..case.ask() }, "2^30");
     refused(Skewed { memory: 10, ..case.ask() }, "MiB");
     let floats = [f32::NAN; 12];
     refused(Skewed { image: Image::F32(&floats), ..case.ask() }, "not a number");

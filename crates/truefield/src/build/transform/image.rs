@@ -1,6 +1,7 @@
 //! The image as it was given: no copy, whatever its type.
 
 use crate::error::{Error, Result};
+use crate::simd::{Fuse, multiversion};
 
 /// Voxels, the last axis contiguous. Signed integers are given as the unsigned ones of the same width, booleans as bytes.
 #[derive(Clone, Copy, Debug)]
@@ -84,28 +85,71 @@ impl Image<'_> {
 
     /// One bit a voxel, set where the value is not zero, for the row that begins at `start`.
     pub(super) fn foreground(&self, start: usize, length: usize, bits: &mut Vec<u64>) {
-        let range = start..start + length;
-        match self {
-            Self::U8(v) => pack(&v[range], |x, _| x != 0, bits),
-            Self::U16(v) => pack(&v[range], |x, _| x != 0, bits),
-            Self::U32(v) => pack(&v[range], |x, _| x != 0, bits),
-            Self::U64(v) => pack(&v[range], |x, _| x != 0, bits),
-            Self::F32(v) => pack(&v[range], |x, _| x != 0.0, bits),
-            Self::F64(v) => pack(&v[range], |x, _| x != 0.0, bits),
-        }
+        foreground(self, start, length, bits);
     }
 
     /// One bit a voxel, set where a label differs from the one before it; the first bit is clear.
     pub(super) fn changes(&self, start: usize, length: usize, bits: &mut Vec<u64>) {
-        let range = start..start + length;
-        match self {
-            Self::U8(v) => pack(&v[range], |x, before| x != before, bits),
-            Self::U16(v) => pack(&v[range], |x, before| x != before, bits),
-            Self::U32(v) => pack(&v[range], |x, before| x != before, bits),
-            Self::U64(v) => pack(&v[range], |x, before| x != before, bits),
-            Self::F32(v) => pack(&v[range], |x, before| x != before, bits),
-            Self::F64(v) => pack(&v[range], |x, before| x != before, bits),
-        }
+        changes(self, start, length, bits);
+    }
+}
+
+multiversion!(
+    fn foreground(image: &Image<'_>, start: usize, length: usize, bits: &mut Vec<u64>) = foreground_body
+);
+
+multiversion!(
+    fn changes(image: &Image<'_>, start: usize, length: usize, bits: &mut Vec<u64>) = changes_body
+);
+
+#[inline(always)]
+fn foreground_body<F: Fuse>(image: &Image<'_>, start: usize, length: usize, bits: &mut Vec<u64>) {
+    let range = start..start + length;
+    match image {
+        Image::U8(v) => pack::<_, Foreground>(&v[range], bits),
+        Image::U16(v) => pack::<_, Foreground>(&v[range], bits),
+        Image::U32(v) => pack::<_, Foreground>(&v[range], bits),
+        Image::U64(v) => pack::<_, Foreground>(&v[range], bits),
+        Image::F32(v) => pack::<_, Foreground>(&v[range], bits),
+        Image::F64(v) => pack::<_, Foreground>(&v[range], bits),
+    }
+}
+
+#[inline(always)]
+fn changes_body<F: Fuse>(image: &Image<'_>, start: usize, length: usize, bits: &mut Vec<u64>) {
+    let range = start..start + length;
+    match image {
+        Image::U8(v) => pack::<_, Changes>(&v[range], bits),
+        Image::U16(v) => pack::<_, Changes>(&v[range], bits),
+        Image::U32(v) => pack::<_, Changes>(&v[range], bits),
+        Image::U64(v) => pack::<_, Changes>(&v[range], bits),
+        Image::F32(v) => pack::<_, Changes>(&v[range], bits),
+        Image::F64(v) => pack::<_, Changes>(&v[range], bits),
+    }
+}
+
+/// A question about a value and the one before it.
+trait Test<T> {
+    fn holds(value: T, before: T) -> bool;
+}
+
+/// Whether the value is not zero.
+struct Foreground;
+
+/// Whether the value is not the one before it.
+struct Changes;
+
+impl<T: Default + PartialEq> Test<T> for Foreground {
+    #[inline(always)]
+    fn holds(value: T, _: T) -> bool {
+        value != T::default()
+    }
+}
+
+impl<T: PartialEq> Test<T> for Changes {
+    #[inline(always)]
+    fn holds(value: T, before: T) -> bool {
+        value != before
     }
 }
 
@@ -118,23 +162,38 @@ fn each<T: Copy>(from: &[T], into: &mut [u32], label: impl Fn(T) -> u32) {
 
 /// One bit for each value and the value before it (itself at the start).
 #[inline(always)]
-fn pack<T: Copy>(values: &[T], test: impl Fn(T, T) -> bool, bits: &mut Vec<u64>) {
+fn pack<T: Copy, Q: Test<T>>(values: &[T], bits: &mut Vec<u64>) {
     bits.clear();
     let Some(&first) = values.first() else { return };
-    let mut bytes = [0u8; 64];
     let mut before = first;
-    for group in values.chunks(64) {
-        bytes[0] = u8::from(test(group[0], before));
-        for i in 1..group.len() {
-            bytes[i] = u8::from(test(group[i], group[i - 1]));
+    let (groups, rest) = values.as_chunks::<64>();
+    for group in groups {
+        let mut earlier = [before; 64];
+        earlier[1..].copy_from_slice(&group[..63]);
+        let mut bytes = [0; 64];
+        for i in 0..64 {
+            bytes[i] = u8::from(Q::holds(group[i], earlier[i]));
         }
-        bytes[group.len()..].fill(0);
-        before = group[group.len() - 1];
-        let mut word = 0;
-        for (i, eight) in bytes.as_chunks::<8>().0.iter().enumerate() {
-            // Eight bytes of 0 or 1 to eight bits: the product brings byte k to bit 56 + k.
-            word |= (u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * i);
-        }
-        bits.push(word);
+        before = group[63];
+        bits.push(squeeze(&bytes));
     }
+    if !rest.is_empty() {
+        let mut bytes = [0; 64];
+        for (byte, &value) in bytes.iter_mut().zip(rest) {
+            *byte = u8::from(Q::holds(value, before));
+            before = value;
+        }
+        bits.push(squeeze(&bytes));
+    }
+}
+
+/// Bytes of 0 or 1 as bits.
+#[inline(always)]
+fn squeeze(bytes: &[u8; 64]) -> u64 {
+    let mut word = 0;
+    for (i, eight) in bytes.as_chunks::<8>().0.iter().enumerate() {
+        // The product brings byte k to bit 56 + k.
+        word |= (u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * i);
+    }
+    word
 }

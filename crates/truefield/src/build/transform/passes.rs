@@ -236,8 +236,10 @@ impl<V: Kind> Passes<'_, V> {
             for panel in panels.iter_mut() {
                 panel.prepare(length, before, reading.is_some());
             }
+            let mut still = cost[0] == V::default() && reading.is_none();
             for row in 0..length {
                 values.read(row, column, &mut line[..width]);
+                still = still && !line[..width].iter().fold(false, |any, &value| any | (value != V::default()));
                 // Lanes to spare do what their neighbour does.
                 let spare = line[width - 1];
                 line[width..width.next_multiple_of(LANES)].fill(spare);
@@ -252,6 +254,10 @@ impl<V: Kind> Passes<'_, V> {
                         panel.labels[row + before] = *lanes;
                     }
                 }
+            }
+            if still {
+                // All are sites, and zero is zero after the root as well.
+                continue;
             }
             let solve = if sites.is_some() { Solve::Nearest } else { Solve::Least };
             for (i, panel) in panels.iter_mut().enumerate() {

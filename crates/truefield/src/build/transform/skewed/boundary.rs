@@ -22,7 +22,7 @@ const MOST: i64 = 4096;
 /// A site that may be nearest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Candidate {
-    pub index: usize,
+    pub place: [i32; 3],
     pub label: u32,
 }
 
@@ -48,7 +48,7 @@ pub(super) fn boundary(job: &Skewed<'_>, reading: Reading, run: &Run<'_>) -> Res
                 Target::OtherSide | Target::OtherLabel => true,
             };
             if site && (neighbours.is_empty() || differs(job, labels, at, &neighbours)) {
-                found.push(Candidate { index: at, label });
+                found.push(Candidate { place: job.place(at), label });
             }
         }
         Ok(found)
@@ -62,7 +62,7 @@ fn differs(job: &Skewed<'_>, labels: &[u32], at: usize, neighbours: &[[i64; 3]])
     neighbours.iter().any(|steps| {
         let mut flat = 0;
         for axis in 0..job.shape.len() {
-            let moved = place[axis] + steps[axis];
+            let moved = i64::from(place[axis]) + steps[axis];
             if moved < 0 || moved >= job.shape[axis] as i64 {
                 return true;
             }

@@ -106,7 +106,7 @@ impl Skewed<'_> {
             let length = near.map_or(f64::INFINITY, |found| found.square.sqrt()) as f32;
             *distance = if self.target == Target::OtherSide && label != 0 { -length } else { length };
             if let Some(sites) = &mut sites {
-                sites[i] = near.map_or(S::NONE, |found| S::of(found.index));
+                sites[i] = near.map_or(S::NONE, |found| S::of(self.flat(found.site.place)));
             }
         }
         Ok(())
@@ -138,14 +138,19 @@ impl Skewed<'_> {
     }
 
     /// Where a voxel lies, as indices along three axes.
-    fn place(&self, flat: usize) -> [i64; 3] {
+    fn place(&self, flat: usize) -> [i32; 3] {
         let mut place = [0; 3];
         let mut rest = flat;
         for axis in (0..self.shape.len()).rev() {
-            place[axis] = (rest % self.shape[axis]) as i64;
+            place[axis] = (rest % self.shape[axis]) as i32;
             rest /= self.shape[axis];
         }
         place
+    }
+
+    /// The flat index of a voxel.
+    fn flat(&self, place: [i32; 3]) -> usize {
+        self.shape.iter().zip(place).fold(0, |flat, (&length, index)| flat * length + index as usize)
     }
 
     /// A difference of indices as a vector.
@@ -189,6 +194,11 @@ impl Skewed<'_> {
             return Err(Error::invalid(format!(
                 "an image of {} axes has no angles between them; give two or three, with a step for each",
                 self.shape.len()
+            )));
+        }
+        if let Some(longest) = self.shape.iter().find(|&&n| n > i32::MAX as usize / 2) {
+            return Err(Error::invalid(format!(
+                "an axis has {longest} voxels; transform parts of the image, of at most 2^30 along each axis"
             )));
         }
         let voxels = self.shape.iter().try_fold(1usize, |all, &n| all.checked_mul(n));

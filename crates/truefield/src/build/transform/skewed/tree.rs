@@ -27,8 +27,7 @@ struct Node {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Found {
     pub square: f64,
-    pub index: usize,
-    label: u32,
+    pub site: Candidate,
 }
 
 pub(super) struct Tree<'a> {
@@ -56,7 +55,7 @@ impl<'a> Tree<'a> {
         run.cancel.check()?;
         let job = self.job;
         let sites = &mut self.sites[start..end];
-        let extent = Aabb::around(sites.iter().map(|site| job.vector(job.place(site.index))));
+        let extent = Aabb::around(sites.iter().map(|site| job.vector(site.place.map(i64::from))));
         let label = Some(sites[0].label).filter(|&label| sites.iter().all(|site| site.label == label));
         let node = self.nodes.len();
         self.nodes.push(Node { extent, start, end, second: 0, label });
@@ -67,8 +66,8 @@ impl<'a> Tree<'a> {
         let axis = (0..3).fold(0, |widest, axis| if size[axis] > size[widest] { axis } else { widest });
         let half = (end - start) / 2;
         sites.select_nth_unstable_by(half, |a, b| {
-            let along = |site: &Candidate| job.vector(job.place(site.index))[axis];
-            along(a).total_cmp(&along(b)).then(a.index.cmp(&b.index))
+            let along = |site: &Candidate| job.vector(site.place.map(i64::from))[axis];
+            along(a).total_cmp(&along(b)).then(a.place.cmp(&b.place))
         });
         self.grow(start, start + half, run)?;
         self.nodes[node].second = self.nodes.len();
@@ -81,10 +80,11 @@ impl<'a> Tree<'a> {
             return None;
         }
         let place = self.job.place(voxel);
-        let at = self.job.vector(place);
-        let mut best = Found { square: f64::INFINITY, index: usize::MAX, label };
-        if let Some(hint) = hint.filter(|hint| hint.label != label) {
-            self.consider(&mut best, place, Candidate { index: hint.index, label: hint.label });
+        let at = self.job.vector(place.map(i64::from));
+        // No site is as far as this.
+        let mut best = Found { square: f64::INFINITY, site: Candidate { place: [i32::MAX; 3], label } };
+        if let Some(hint) = hint.filter(|hint| hint.site.label != label) {
+            self.consider(&mut best, place, hint.site);
         }
         let scale = at.length_squared();
         let mut waiting = [(0usize, 0.0f64); 64];
@@ -114,7 +114,7 @@ impl<'a> Tree<'a> {
             waiting[count + 1] = near;
             count += 2;
         }
-        (best.index != usize::MAX).then_some(best)
+        best.square.is_finite().then_some(best)
     }
 
     /// Whether nothing in a box can be as near as the best.
@@ -126,9 +126,8 @@ impl<'a> Tree<'a> {
 
     /// Takes a site that is nearer than the best, or as near and lower.
     #[inline]
-    fn consider(&self, best: &mut Found, place: [i64; 3], site: Candidate) {
-        let to = self.job.place(site.index);
-        let way = self.job.vector([to[0] - place[0], to[1] - place[1], to[2] - place[2]]);
+    fn consider(&self, best: &mut Found, place: [i32; 3], site: Candidate) {
+        let way = self.job.vector(std::array::from_fn(|axis| i64::from(site.place[axis] - place[axis])));
         let square = if self.facets.is_empty() {
             way.length_squared()
         } else if self.beyond(way.length_squared(), best.square, 0.0) {
@@ -136,8 +135,8 @@ impl<'a> Tree<'a> {
         } else {
             self.facets.iter().map(|facet| facet.distance_squared(-way)).fold(f64::INFINITY, f64::min)
         };
-        if square < best.square || square == best.square && site.index < best.index {
-            *best = Found { square, index: site.index, label: site.label };
+        if square < best.square || square == best.square && site.place < best.site.place {
+            *best = Found { square, site };
         }
     }
 }
