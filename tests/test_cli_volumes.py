@@ -83,10 +83,19 @@ def test_threshold_labels_and_faces(truefield: Command, folder: Path) -> None:
         (("--threshold", 150), scan.values > 150, {}),
         (("--labels", "--periodic"), scan.values, {"target": "other_label", "periodic": True}),
         (("--surface", "between"), scan.values, {"surface": "between"}),
+        (("--method", "marching"), scan.values, {"method": "marching"}),
     ]:
         truefield.done("transform", folder / "scan.nrrd", *words, "-o", folder / "a.npz")
         expected = tf.distance_transform(values, sampling=(0.5, 0.25, 2.0), **options)  # type: ignore[arg-type]
         np.testing.assert_array_equal(tf.read_volume(folder / "a.npz").values, expected)
+
+
+def test_a_wavefront_says_how_many_passes_it_took(truefield: Command, folder: Path) -> None:
+    said = truefield.done("transform", folder / "scan.nrrd", "--method", "wavefront", "-o", folder / "a.npz")
+    scan = tf.read_volume(folder / "scan.nrrd")
+    expected = tf.distance_transform(scan.values, sampling=(0.5, 0.25, 2.0), method="wavefront")
+    assert f"{expected.passes} passes" in said
+    np.testing.assert_array_equal(tf.read_volume(folder / "a.npz").values, expected.distance)
 
 
 def test_an_image_becomes_a_picture_of_floats(truefield: Command, folder: Path) -> None:

@@ -232,3 +232,22 @@ def test_the_medial_axis_of_a_wall_is_its_middle() -> None:
             wall.medial_axis(angle=bad)
     with pytest.raises(tf.TruefieldError, match="side"):
         wall.medial_axis("between")  # type: ignore[arg-type]
+
+
+def test_the_transform_of_a_scan_is_a_field_whose_bounds_hold(probes: Floats) -> None:
+    """What a scanner makes of a ball, in voxels: the truth is the ball's."""
+    inside = ball(nodes()) < 0
+    scan = tf.Volume(inside, ORIGIN, SPACING)
+    for surface in ("centers", "between"):
+        made = tf.distance_transform(
+            scan.values, sampling=scan.spacing, signed=True, surface=surface, return_bounds=True
+        )
+        field = tf.SampledField.from_volume(scan.holding(made.distance), lower=made.lower, upper=made.upper)
+        lower, upper = field.bounds(probes)
+        truth = ball(probes)
+        assert np.all((lower <= truth) & (truth <= upper))
+        mesh = field.surface()
+        assert mesh.check().watertight
+        assert np.abs(ball(mesh.vertices)).max() < np.linalg.norm(SPACING)
+        grown = field.offset(0.1)
+        assert np.all((grown.lower <= ball(nodes()) - 0.1) & (ball(nodes()) - 0.1 <= grown.upper))

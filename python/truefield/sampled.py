@@ -76,7 +76,14 @@ class SampledField:
         return cls(_truefield.SampledField(samples, low, step, known))
 
     @classmethod
-    def from_volume(cls, volume: Volume, *, error: float | None = None) -> SampledField:
+    def from_volume(
+        cls,
+        volume: Volume,
+        *,
+        error: float | None = None,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+    ) -> SampledField:
         """The field whose samples a volume holds; see `from_array`.
 
         Raises:
@@ -85,7 +92,8 @@ class SampledField:
         if volume.values.ndim != 3 or not volume.straight:
             what = "is an image" if volume.values.ndim != 3 else "has axes that are turned"
             raise TruefieldError(f"'{volume.name}' {what}; a field has samples along x, y and z: use from_array")
-        return cls.from_array(volume.values, volume.origin, volume.spacing, error=error)
+        place = {"origin": volume.origin, "spacing": volume.spacing}
+        return cls.from_array(volume.values, **place, error=error, lower=lower, upper=upper)
 
     def volume(self, name: str = "distance") -> Volume:
         """The samples with their place, for a file: `field.volume().write("distance.nrrd")`; not a copy."""

@@ -3,7 +3,7 @@
 use truefield::laws::{Random, check_threads};
 use truefield::product::contour::Placement;
 use truefield::product::medial::{MedialAxis, Where, medial_axis};
-use truefield::product::sampled::contour;
+use truefield::product::sampled::{SampledContour, contour};
 use truefield::{Continuity, DVec3, Distance, Error, Known, Lattice, Run, SampledField};
 
 const PLENTY: u64 = 1 << 30;
@@ -57,22 +57,28 @@ fn contours_hold_both_guarantees() {
         }
         // Roots of the interpolation along random lines are near a point.
         let reach = if placement == Placement::Projected { tolerance } else { 0.5 * tolerance } * (1.0 + 1e-6);
-        let mut judged = 0;
-        while judged < 300 {
-            let (mut a, mut b) = (random.within(&lattice().extent()), random.within(&lattice().extent()));
-            let value = |p: DVec3| field.interpolate(p).expect("inside") - distance;
-            if (value(a) < 0.0) == (value(b) < 0.0) {
-                continue;
-            }
-            for _ in 0..60 {
-                let middle = (a + b) * 0.5;
-                if (value(middle) < 0.0) == (value(a) < 0.0) { a = middle } else { b = middle }
-            }
-            let nearest = found.points.iter().map(|p| (*p - a).length()).fold(f64::INFINITY, f64::min);
-            assert!(nearest <= reach, "{a} is on the contour and {nearest} from the next point, tolerance {tolerance}");
-            judged += 1;
-        }
+        assert!(farthest(&field, distance, &found, &mut random) <= reach, "distance {distance}, tolerance {tolerance}");
     }
+}
+
+/// How far roots of the interpolation along random lines are from the next point of a contour, at most.
+fn farthest(field: &SampledField, distance: f64, found: &SampledContour, random: &mut Random) -> f64 {
+    let extent = field.lattice().extent();
+    let value = |p: DVec3| field.interpolate(p).expect("inside") - distance;
+    let (mut farthest, mut judged) = (0.0f64, 0);
+    while judged < 300 {
+        let (mut a, mut b) = (random.within(&extent), random.within(&extent));
+        if (value(a) < 0.0) == (value(b) < 0.0) {
+            continue;
+        }
+        for _ in 0..60 {
+            let middle = (a + b) * 0.5;
+            if (value(middle) < 0.0) == (value(a) < 0.0) { a = middle } else { b = middle }
+        }
+        farthest = farthest.max(found.points.iter().map(|p| (*p - a).length()).fold(f64::INFINITY, f64::min));
+        judged += 1;
+    }
+    farthest
 }
 
 /// On a face between cells the gradient is that of either.
@@ -93,19 +99,7 @@ fn contours_of_anything_hold_too() {
         let tolerance = 0.3;
         let found = contour(&field, 0.0, tolerance, Placement::Lattice, PLENTY, &Run::default()).expect("a contour");
         assert!(found.points.iter().all(|&p| field.interpolate(p).expect("inside").abs() <= 0.5 * tolerance * (1.0 + 1e-9)));
-        for _ in 0..300 {
-            let (mut a, mut b) = (random.within(&lattice.extent()), random.within(&lattice.extent()));
-            let value = |p: DVec3| field.interpolate(p).expect("inside");
-            if (value(a) < 0.0) == (value(b) < 0.0) {
-                continue;
-            }
-            for _ in 0..60 {
-                let middle = (a + b) * 0.5;
-                if (value(middle) < 0.0) == (value(a) < 0.0) { a = middle } else { b = middle }
-            }
-            let nearest = found.points.iter().map(|p| (*p - a).length()).fold(f64::INFINITY, f64::min);
-            assert!(nearest <= 0.5 * tolerance * (1.0 + 1e-9), "{a}: {nearest}");
-        }
+        assert!(farthest(&field, 0.0, &found, &mut random) <= 0.5 * tolerance * (1.0 + 1e-9), "scale {scale}");
         assert!(found.bounds.iter().all(|b| b.lower == f64::NEG_INFINITY && b.upper == f64::INFINITY));
         assert_eq!(field.at(DVec3::ZERO).width(), f64::INFINITY);
     }

@@ -58,6 +58,14 @@ Written = Annotated[
 ]
 
 
+Lower = Annotated[
+    Path | None, typer.Option("--lower", show_default=False, help="Also write lower bounds of the distances here.")
+]
+Upper = Annotated[
+    Path | None, typer.Option("--upper", show_default=False, help="Also write upper bounds of the distances here.")
+]
+
+
 Askable = Annotated[
     Path,
     typer.Argument(

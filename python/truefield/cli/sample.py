@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from enum import Enum
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, Written, ready
+from truefield.cli.options import Askable, Lower, Sign, SignRule, Threads, Upper, Weld, Written, ready
 from truefield.cli.progress import progress
 
 
@@ -40,12 +39,8 @@ def sample(
     margin: Annotated[
         float, typer.Option("--margin", help="How far samples go beyond the box of the part, in model units.")
     ] = 0.0,
-    lower: Annotated[
-        Path | None, typer.Option("--lower", show_default=False, help="Also write lower bounds of the distances here.")
-    ] = None,
-    upper: Annotated[
-        Path | None, typer.Option("--upper", show_default=False, help="Also write upper bounds of the distances here.")
-    ] = None,
+    lower: Lower = None,
+    upper: Upper = None,
     sign: SignRule = Sign.AUTO,
     weld: Weld = None,
     threads: Threads = None,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Threads, Written
+from truefield.cli.options import Lower, Threads, Upper, Written
 from truefield.cli.progress import progress
 
 
@@ -25,6 +25,14 @@ class Beyond(str, Enum):
     NOTHING = "nothing"
     BACKGROUND = "background"
     FOREGROUND = "foreground"
+
+
+class Method(str, Enum):
+    """How distances are found."""
+
+    EXACT = "exact"
+    WAVEFRONT = "wavefront"
+    MARCHING = "marching"
 
 
 def transform(
@@ -53,15 +61,14 @@ def transform(
     ] = Placing.CENTERS,
     border: Annotated[Beyond, typer.Option("--border", help="What lies beyond the image.")] = Beyond.NOTHING,
     periodic: Annotated[bool, typer.Option("--periodic", help="The image goes on with its other end.")] = False,
-    lower: Annotated[
-        Path | None, typer.Option("--lower", show_default=False, help="Also write lower bounds of the distances here.")
-    ] = None,
-    upper: Annotated[
-        Path | None, typer.Option("--upper", show_default=False, help="Also write upper bounds of the distances here.")
-    ] = None,
+    lower: Lower = None,
+    upper: Upper = None,
+    method: Annotated[
+        Method, typer.Option("--method", help="How distances are found; `marching` is not exact everywhere.")
+    ] = Method.EXACT,
     threads: Threads = None,
 ) -> None:
-    """The exact Euclidean distance transform of an image or volume, in its own units and place.
+    """The Euclidean distance transform of an image or volume, in its own units and place.
 
     Bounds enclose the distance to the surface that the voxels stand for, wherever it runs through them.
     """
@@ -88,6 +95,7 @@ def transform(
             surface=surface.value,
             border=border.value,
             periodic=periodic,
+            method=method.value,
             return_bounds=bounds,
             threads=threads,
             progress=report,
@@ -100,5 +108,7 @@ def transform(
     counts = " x ".join(map(str, image.shape))
     inside = int(np.count_nonzero(values))
     typer.echo(f"{output}: {counts} samples, {inside} in the foreground, distances to {float(distances.max()):.6g}")
+    if isinstance(made, tf.DistanceTransform) and made.passes is not None:
+        typer.echo(f"{made.passes} passes until nothing changed")
     if np.isinf(distances).all():
         typer.echo("all voxels are of one kind, so there is nothing to be near to: all distances are infinite")
