@@ -20,6 +20,9 @@ pub(super) trait Metric: Copy + Send + Sync {
     /// `key`, or the first that is beyond the limit.
     fn within(self, key: Self::Key) -> Self::Key;
 
+    /// Voxels with this key or a smaller one do not change in this pass or later: what comes is as many steps away.
+    fn settled(self, pass: u16) -> Self::Key;
+
     /// The number of the neighbour, and the key without it.
     fn split(key: Self::Key) -> (usize, Self::Key);
 
@@ -80,6 +83,10 @@ impl Metric for Whole {
         key.min(self.end)
     }
 
+    fn settled(self, pass: u16) -> u32 {
+        (u32::from(pass) * u32::from(pass)).min(Self::LARGEST as u32 - 1) << 5
+    }
+
     fn split(key: u32) -> (usize, u32) {
         ((key & CODE) as usize, key & !CODE)
     }
@@ -120,6 +127,11 @@ impl Metric for Scaled {
     #[inline(always)]
     fn within(self, key: u64) -> u64 {
         key.min(self.end)
+    }
+
+    fn settled(self, pass: u16) -> u64 {
+        let [x, y, z] = self.squares;
+        Self::split((f64::from(pass) * f64::from(pass) * x.min(y).min(z)).to_bits()).1
     }
 
     fn split(key: u64) -> (usize, u64) {

@@ -3,15 +3,15 @@
 //! *Bounded distance transforms of trimmed NURBS*, Algorithm 1: in each pass every voxel looks at the sites its 26
 //! (in the plane 8) neighbours had before the pass and keeps the one nearest to itself, so that distances are those of
 //! a site that is there and no error of marching adds up. The paper keeps two buffers; here what a pass finds is
-//! applied after it, and segments of rows look only at rows that changed in the pass before. Neither changes a bit of the
-//! outcome. It ends when nothing changed.
+//! applied after it, and segments of rows look only at neighbours that changed in the pass before and whose site is ahead of
+//! them. Neither changes a bit of the outcome. It ends when nothing changed.
 //!
 //! Passes in step make it exact (Theorem 1, by another proof): after pass m each voxel v has the nearest of the sites that
 //! are at most m steps away along every axis. Let s be such a site, m steps away along some axes, and u the neighbour of v one
 //! step nearer to s along those. After pass m - 1, u has a site r with |u - r| <= |u - s|, at most m - 1 steps away along
 //! every axis. A step away from r adds at most 2 m - 1 to a squared number of steps, which is what the step from u to v adds for s;
 //! so |v - r| <= |v - s|, whatever the sampling. It follows that the longest axis bounds the passes: one less than its
-//! voxels. Without passes in step neither holds ([`super::march`]; Danielsson 1980), and [`super::difference`] counts.
+//! voxels; and that what changes in pass m has a site m steps away along some axis, and hands it on that way only. Without passes in step neither holds ([`super::march`]; Danielsson 1980), and [`super::difference`] counts.
 
 mod metric;
 mod planes;
@@ -78,8 +78,8 @@ pub fn wavefront(shape: &[usize], sampling: &[f64], sites: &[bool], limit: f64, 
 /// A slab's part of the work.
 #[derive(Debug, Default)]
 struct Agenda {
-    /// For each segment of the slab the rows it has to look at.
-    rows: Vec<u16>,
+    /// For each segment of the slab the neighbours it has to look at.
+    wanted: Vec<u32>,
     /// The segments that have to look at any.
     looks: Vec<Look>,
 }
@@ -103,12 +103,13 @@ fn go<M: Ringed>(layout: Layout, metric: M, sites: &[bool], run: &Run<'_>) -> Re
             Ok(())
         })?;
         drop(parts);
+        let pass = changed.len() as u16 + 1;
         found = run.blocks("wavefront", slabs, |slab| {
             let agenda = agendas[slab].lock().unwrap_or_else(PoisonError::into_inner);
             let mut found = Found::default();
             for looks in agenda.looks.chunks(CHUNK) {
                 run.cancel.check()?;
-                M::ring(&planes, looks, &mut found);
+                M::ring(&planes, pass, looks, &mut found);
             }
             Ok(found)
         })?;
@@ -132,7 +133,7 @@ fn seeds<M: Metric>(planes: &Planes<M>, slab: usize) -> Found<M::Key> {
             let keys = planes.key[at..at + LANES].iter().enumerate();
             let voxels = keys.fold(0, |bits, (lane, key)| bits | u16::from(*key == M::SITE) << lane);
             if voxels != 0 {
-                found.segments.push(Changed { row: row as u32, segment: segment as u32, voxels });
+                found.segments.push(Changed { row: row as u32, segment: segment as u32, voxels, ahead: u8::MAX });
             }
         }
     }
@@ -151,36 +152,40 @@ fn apply<M: Metric>(layout: &Layout, slab: usize, found: &[Found<M::Key>], part:
     }
 }
 
-/// Which segments of a slab have to look at which rows, after what changed in it and beside it.
+/// Which segments of a slab have to look at which neighbours, after what changed in it and beside it.
 fn plan<K>(layout: &Layout, slab: usize, found: &[Found<K>], agenda: &mut Agenda) {
     let (rows, around, segments) = (layout.rows(slab), layout.rows_around(slab), layout.segments());
-    agenda.rows.resize(rows.len() * segments, 0);
-    for look in agenda.looks.drain(..) {
-        agenda.rows[(look.row as usize - rows.start) * segments + look.segment as usize] = 0;
-    }
-    let Agenda { rows: wanted, looks } = agenda;
+    let Agenda { wanted, looks } = agenda;
+    wanted.resize(rows.len() * segments, 0);
+    looks.clear();
     let beside = &found[slab.saturating_sub(1)..(slab + 2).min(found.len())];
     for changed in beside.iter().flat_map(|found| &found.segments).filter(|changed| around.contains(&(changed.row as usize))) {
         let (place, segment) = (layout.place(changed.row as usize), changed.segment as usize);
-        // A change at an end is seen by the segment beyond it, too.
-        let first = segment - usize::from(changed.voxels & 1 != 0 && segment > 0);
-        let last = segment + usize::from(changed.voxels >> (LANES - 1) != 0 && segment + 1 < segments);
-        for x in -1..=1 {
-            for y in -1..=1 {
-                let Some(row) = layout.row(place, x, y).filter(|row| rows.contains(row)) else { continue };
-                let start = (row - rows.start) * segments;
-                for (segment, wanted) in (first..).zip(&mut wanted[start + first..=start + last]) {
-                    if *wanted == 0 {
-                        looks.push(Look { row: row as u32, segment: segment as u32, rows: 0 });
-                    }
-                    // Seen from there, the change is in the row the other way.
-                    *wanted |= 1 << (4 - 3 * x - y);
+        let ahead = |axis: usize, step: isize| step != 0 && changed.ahead >> (2 * axis + usize::from(step < 0)) & 1 != 0;
+        for (x, y) in (0..9).map(|n| (n / 3 - 1, n % 3 - 1)) {
+            // Bits for the neighbours before, beside and after a voxel: they step ahead upward, not at all and downward.
+            let bits = if ahead(0, x) || ahead(1, y) { 7 } else { u32::from(ahead(2, 1)) | u32::from(ahead(2, -1)) << 2 };
+            let Some(row) = layout.row(place, x, y).filter(|row| bits != 0 && rows.contains(row)) else { continue };
+            // Seen from there, the change is in the row the other way.
+            let shift = 3 * (4 - 3 * x - y);
+            let mut mark = |segment: usize, bits: u32| {
+                let wanted = &mut wanted[(row - rows.start) * segments + segment];
+                if *wanted == 0 && bits != 0 {
+                    looks.push(Look { row: row as u32, segment: segment as u32, neighbours: 0 });
                 }
+                *wanted |= bits << shift;
+            };
+            mark(segment, bits);
+            if changed.voxels & 1 != 0 && segment > 0 {
+                mark(segment - 1, bits & 4);
+            }
+            if changed.voxels >> (LANES - 1) != 0 && segment + 1 < segments {
+                mark(segment + 1, bits & 1);
             }
         }
     }
     for look in looks {
-        look.rows = wanted[(look.row as usize - rows.start) * segments + look.segment as usize];
+        look.neighbours = std::mem::take(&mut wanted[(look.row as usize - rows.start) * segments + look.segment as usize]);
     }
 }
 

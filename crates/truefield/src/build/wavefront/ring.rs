@@ -1,23 +1,26 @@
 //! One ring: segments of 16 voxels look at their neighbours, a vector at a time.
 
-use super::metric::{Metric, Scaled, Whole, delta};
+use super::metric::{Metric, Scaled, Whole, code, delta};
 use super::planes::{LANES, Planes};
 use crate::simd::{Fuse, multiversion};
 
-/// A segment that may change, and the rows whose voxels it has to look at: bit 3 (x + 1) + y + 1 for row `(x, y)`.
+/// A segment that may change, and the neighbours that its voxels have to look at: bit i for that with number i + 1.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Look {
     pub row: u32,
     pub segment: u32,
-    pub rows: u16,
+    pub neighbours: u32,
 }
 
-/// A segment that changed: bit i for voxel i.
+/// A segment that changed.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Changed {
     pub row: u32,
     pub segment: u32,
+    /// Bit i for voxel i.
     pub voxels: u16,
+    /// The directions in which the front goes on from here: bit 2 i for axis i upward, bit 2 i + 1 downward.
+    pub ahead: u8,
 }
 
 /// A voxel's new state.
@@ -45,73 +48,60 @@ impl<K> Default for Found<K> {
 
 /// A metric whose rings are compiled for several instruction sets.
 pub(super) trait Ringed: Metric {
-    /// Looks at segments and notes what changes.
-    fn ring(planes: &Planes<Self>, looks: &[Look], found: &mut Found<Self::Key>);
+    /// Looks at segments in a pass and notes what changes.
+    fn ring(planes: &Planes<Self>, pass: u16, looks: &[Look], found: &mut Found<Self::Key>);
 }
 
 impl Ringed for Whole {
-    fn ring(planes: &Planes<Self>, looks: &[Look], found: &mut Found<u32>) {
-        ring_whole(planes, looks, found);
+    fn ring(planes: &Planes<Self>, pass: u16, looks: &[Look], found: &mut Found<u32>) {
+        ring_whole(planes, pass, looks, found);
     }
 }
 
 impl Ringed for Scaled {
-    fn ring(planes: &Planes<Self>, looks: &[Look], found: &mut Found<u64>) {
-        ring_scaled(planes, looks, found);
+    fn ring(planes: &Planes<Self>, pass: u16, looks: &[Look], found: &mut Found<u64>) {
+        ring_scaled(planes, pass, looks, found);
     }
 }
 
-multiversion!(fn ring_whole(planes: &Planes<Whole>, looks: &[Look], found: &mut Found<u32>) = ring_whole_body);
-multiversion!(fn ring_scaled(planes: &Planes<Scaled>, looks: &[Look], found: &mut Found<u64>) = ring_scaled_body);
+multiversion!(fn ring_whole(planes: &Planes<Whole>, pass: u16, looks: &[Look], found: &mut Found<u32>) = ring_whole_body);
+multiversion!(fn ring_scaled(planes: &Planes<Scaled>, pass: u16, looks: &[Look], found: &mut Found<u64>) = ring_scaled_body);
 
 #[inline(always)]
-fn ring_whole_body<F: Fuse>(planes: &Planes<Whole>, looks: &[Look], found: &mut Found<u32>) {
-    ring(planes, looks, found);
+fn ring_whole_body<F: Fuse>(planes: &Planes<Whole>, pass: u16, looks: &[Look], found: &mut Found<u32>) {
+    ring(planes, pass, looks, found);
 }
 
 #[inline(always)]
-fn ring_scaled_body<F: Fuse>(planes: &Planes<Scaled>, looks: &[Look], found: &mut Found<u64>) {
-    ring(planes, looks, found);
+fn ring_scaled_body<F: Fuse>(planes: &Planes<Scaled>, pass: u16, looks: &[Look], found: &mut Found<u64>) {
+    ring(planes, pass, looks, found);
 }
 
 #[inline(always)]
-fn ring<M: Metric>(planes: &Planes<M>, looks: &[Look], found: &mut Found<M::Key>) {
-    let layout = &planes.layout;
+fn ring<M: Metric>(planes: &Planes<M>, pass: u16, looks: &[Look], found: &mut Found<M::Key>) {
+    let (layout, settled) = (&planes.layout, planes.metric.settled(pass));
     for look in looks {
         let first = look.segment as usize * LANES;
         let at = layout.start(look.row as usize) + first;
-        let held: &[M::Key] = &planes.key[at..at + LANES];
+        let Some(held) = planes.key[at..].first_chunk::<LANES>() else { continue };
+        let mut open = false;
+        for key in held {
+            open |= *key > settled;
+        }
+        if !open {
+            continue;
+        }
         let limits: [M::Key; LANES] = std::array::from_fn(|lane| planes.metric.within(held[lane]));
-        let mut best = limits;
-        let beside = |x: isize, y: isize| at.wrapping_add(layout.jump(x, y));
-        let wanted = |row: u16| look.rows >> row & 1 != 0;
-        if wanted(0) {
-            row::<M, -1, -1>(planes, beside(-1, -1), &mut best);
-        }
-        if wanted(1) {
-            row::<M, -1, 0>(planes, beside(-1, 0), &mut best);
-        }
-        if wanted(2) {
-            row::<M, -1, 1>(planes, beside(-1, 1), &mut best);
-        }
-        if wanted(3) {
-            row::<M, 0, -1>(planes, beside(0, -1), &mut best);
-        }
-        if wanted(4) {
-            row::<M, 0, 0>(planes, at, &mut best);
-        }
-        if wanted(5) {
-            row::<M, 0, 1>(planes, beside(0, 1), &mut best);
-        }
-        if wanted(6) {
-            row::<M, 1, -1>(planes, beside(1, -1), &mut best);
-        }
-        if wanted(7) {
-            row::<M, 1, 0>(planes, beside(1, 0), &mut best);
-        }
-        if wanted(8) {
-            row::<M, 1, 1>(planes, beside(1, 1), &mut best);
-        }
+        let best = limits;
+        let best = row::<M, -1, -1>(planes, look, at, best);
+        let best = row::<M, -1, 0>(planes, look, at, best);
+        let best = row::<M, -1, 1>(planes, look, at, best);
+        let best = row::<M, 0, -1>(planes, look, at, best);
+        let best = row::<M, 0, 0>(planes, look, at, best);
+        let best = row::<M, 0, 1>(planes, look, at, best);
+        let best = row::<M, 1, -1>(planes, look, at, best);
+        let best = row::<M, 1, 0>(planes, look, at, best);
+        let best = row::<M, 1, 1>(planes, look, at, best);
         let mut voxels = 0u16;
         for lane in 0..LANES {
             voxels |= u16::from(best[lane] < limits[lane]) << lane;
@@ -119,30 +109,39 @@ fn ring<M: Metric>(planes: &Planes<M>, looks: &[Look], found: &mut Found<M::Key>
         // Beyond the end of the row there are no voxels.
         voxels &= u16::MAX >> (LANES - (layout.shape[2] - first).min(LANES));
         if voxels != 0 {
-            note(planes, look, at, &best, voxels, found);
+            note(planes, pass, look, at, &best, voxels, found);
         }
     }
 }
 
-/// What the three neighbours in row `(X, Y)`, whose voxel beside the first lane is at `at`, offer every lane.
+/// What the neighbours in row `(X, Y)` offer a segment at `at` that has `best` so far.
 #[inline(always)]
-fn row<M: Metric, const X: i16, const Y: i16>(planes: &Planes<M>, at: usize, best: &mut [M::Key; LANES]) {
-    let (Some(key), [Some(x), Some(y), Some(z)]) = (span(&planes.key, at), planes.offset.each_ref().map(|offset| span(offset, at))) else {
-        return;
-    };
+fn row<M: Metric, const X: i16, const Y: i16>(planes: &Planes<M>, look: &Look, at: usize, best: [M::Key; LANES]) -> [M::Key; LANES] {
+    let wanted = look.neighbours >> (code(X, Y, -1) - 1) & 7;
+    if wanted == 0 {
+        return best;
+    }
+    let at = at.wrapping_add(planes.layout.jump(X as isize, Y as isize));
+    let (key, offset) = (span(&planes.key, at), planes.offset.each_ref().map(|offset| span(offset, at)));
+    let (Some(key), [Some(x), Some(y), Some(z)]) = (key, offset) else { return best };
+    let best = if wanted & 1 != 0 { step::<M, X, Y, -1>(planes.metric, key, [x, y, z], best) } else { best };
+    let best = if wanted & 2 != 0 { step::<M, X, Y, 0>(planes.metric, key, [x, y, z], best) } else { best };
+    if wanted & 4 != 0 { step::<M, X, Y, 1>(planes.metric, key, [x, y, z], best) } else { best }
+}
+
+/// What one neighbour offers.
+#[inline(always)]
+fn step<M: Metric, const X: i16, const Y: i16, const Z: i16>(
+    metric: M,
+    key: &[M::Key; LANES + 2],
+    [x, y, z]: [&[i16; LANES + 2]; 3],
+    mut best: [M::Key; LANES],
+) -> [M::Key; LANES] {
     for lane in 0..LANES {
-        best[lane] = best[lane].min(planes.metric.offer::<X, Y, -1>(key[lane], x[lane], y[lane], z[lane]));
+        let i = (lane as isize + 1 + Z as isize) as usize;
+        best[lane] = best[lane].min(metric.offer::<X, Y, Z>(key[i], x[i], y[i], z[i]));
     }
-    if X != 0 || Y != 0 {
-        for lane in 0..LANES {
-            let i = lane + 1;
-            best[lane] = best[lane].min(planes.metric.offer::<X, Y, 0>(key[i], x[i], y[i], z[i]));
-        }
-    }
-    for lane in 0..LANES {
-        let i = lane + 2;
-        best[lane] = best[lane].min(planes.metric.offer::<X, Y, 1>(key[i], x[i], y[i], z[i]));
-    }
+    best
 }
 
 /// The values beside a segment that starts at `at`, one more at both ends.
@@ -152,9 +151,8 @@ fn span<T>(values: &[T], at: usize) -> Option<&[T; LANES + 2]> {
 }
 
 /// Notes the new state of `voxels` of a segment.
-fn note<M: Metric>(planes: &Planes<M>, look: &Look, at: usize, best: &[M::Key; LANES], voxels: u16, found: &mut Found<M::Key>) {
-    found.segments.push(Changed { row: look.row, segment: look.segment, voxels });
-    let mut rest = voxels;
+fn note<M: Metric>(planes: &Planes<M>, pass: u16, look: &Look, at: usize, best: &[M::Key; LANES], voxels: u16, found: &mut Found<M::Key>) {
+    let (mut rest, mut ahead, front) = (voxels, 0, pass as i16);
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize;
         rest &= rest - 1;
@@ -163,7 +161,11 @@ fn note<M: Metric>(planes: &Planes<M>, look: &Look, at: usize, best: &[M::Key; L
         let here = at + lane;
         let from = here.wrapping_add(planes.layout.jump(isize::from(x), isize::from(y))).wrapping_add_signed(isize::from(z));
         let offset = [planes.offset[0][from] - x, planes.offset[1][from] - y, planes.offset[2][from] - z];
+        for axis in 0..3 {
+            ahead |= u8::from(offset[axis] == front) << (2 * axis) | u8::from(offset[axis] == -front) << (2 * axis + 1);
+        }
         found.reached += usize::from(planes.key[here] == M::NONE);
         found.voxels.push(Change { at: here as u32, key, offset });
     }
+    found.segments.push(Changed { row: look.row, segment: look.segment, voxels, ahead });
 }
