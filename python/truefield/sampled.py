@@ -267,21 +267,35 @@ class SampledField:
 
         storage.save(self, path, progress=progress)
 
-    def offset(self, distance: float, *, threads: int | None = None, progress: Progress | None = None) -> SampledField:
+    def offset(
+        self,
+        distance: float,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> SampledField:
         """The solid grown by `distance`, model units, or shrunk if it is negative.
 
         Values are the samples less `distance`. Bounds enclose the distance of the new solid: as narrow as they were
         outside of one that grows and inside of one that shrinks. On its other side, where fronts that met may have
-        left it deeper than the samples say, one bound comes from the samples across, some percent wider.
+        left it deeper than the samples say, one bound comes from the samples across, some percent wider. Takes 29 bytes
+        a sample while it runs, 12 then.
 
         Raises:
             TruefieldError: the field is of a mesh with openings, or the distance is not finite.
+            MemoryError: the samples do not fit into `memory` bytes, half the machine's memory by default.
         """
         length = arguments.number("distance", distance)
-        return SampledField(self._native.offset(length, threads, progress))
+        return SampledField(self._native.offset(length, arguments.memory(memory), threads, progress))
 
     def union(
-        self, other: SampledField, *, threads: int | None = None, progress: Progress | None = None
+        self,
+        other: SampledField,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
     ) -> SampledField:
         """What is in one solid or in the other; also written `a | b`.
 
@@ -290,20 +304,31 @@ class SampledField:
 
         Raises:
             TruefieldError: the fields are on different lattices (see `resample`), or of a mesh with openings.
+            MemoryError: the samples do not fit into `memory` bytes, half the machine's memory by default.
         """
-        return self._combined("union", other, threads, progress)
+        return self._combined("union", other, memory, threads, progress)
 
     def intersection(
-        self, other: SampledField, *, threads: int | None = None, progress: Progress | None = None
+        self,
+        other: SampledField,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
     ) -> SampledField:
         """What is in both solids; also written `a & b`. Values are the greater of both; see `union` for bounds."""
-        return self._combined("intersection", other, threads, progress)
+        return self._combined("intersection", other, memory, threads, progress)
 
     def difference(
-        self, other: SampledField, *, threads: int | None = None, progress: Progress | None = None
+        self,
+        other: SampledField,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
     ) -> SampledField:
         """What is in this solid and not in the other; also written `a - b`. See `union` for bounds."""
-        return self._combined("difference", other, threads, progress)
+        return self._combined("difference", other, memory, threads, progress)
 
     def complement(self) -> SampledField:
         """What is outside: all signs changed, as exact as before; also written `~a`."""
@@ -354,10 +379,12 @@ class SampledField:
         native = self._native.resample(low, step, counted, arguments.memory(memory), threads, progress)
         return SampledField(native)
 
-    def _combined(self, name: str, other: SampledField, threads: int | None, progress: Progress | None) -> SampledField:
+    def _combined(
+        self, name: str, other: SampledField, memory: int | None, threads: int | None, progress: Progress | None
+    ) -> SampledField:
         if not isinstance(other, SampledField):
             raise TruefieldError(f"a SampledField is combined with another, not with {type(other).__name__}")
-        return SampledField(self._native.combine(name, other._native, threads, progress))
+        return SampledField(self._native.combine(name, other._native, arguments.memory(memory), threads, progress))
 
     def __or__(self, other: SampledField) -> SampledField:
         """The union."""

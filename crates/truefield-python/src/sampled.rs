@@ -188,18 +188,26 @@ impl PySampledField {
         self.derived(py, Some(1), None, |field, _| complement(field))
     }
 
-    #[pyo3(signature = (distance, threads=None, progress=None))]
-    fn offset(&self, py: Python<'_>, distance: f64, threads: Option<usize>, progress: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        self.derived(py, threads, progress, |field, run| offset(field, distance, run))
+    #[pyo3(signature = (distance, memory, threads=None, progress=None))]
+    fn offset(
+        &self,
+        py: Python<'_>,
+        distance: f64,
+        memory: u64,
+        threads: Option<usize>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        self.derived(py, threads, progress, |field, run| offset(field, distance, memory, run))
     }
 
     /// "union", "intersection" or "difference" with another field.
-    #[pyo3(signature = (name, other, threads=None, progress=None))]
+    #[pyo3(signature = (name, other, memory, threads=None, progress=None))]
     fn combine(
         &self,
         py: Python<'_>,
         name: &str,
         other: &Self,
+        memory: u64,
         threads: Option<usize>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
@@ -213,7 +221,7 @@ impl PySampledField {
                 ))));
             }
         };
-        self.derived(py, threads, progress, |field, run| operation(field, &other.0, run))
+        self.derived(py, threads, progress, |field, run| operation(field, &other.0, memory, run))
     }
 
     /// `(vertices, triangles, lower, upper)`: a mesh and its box.

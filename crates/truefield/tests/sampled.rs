@@ -167,19 +167,19 @@ fn solids_are_combined_with_bounds_that_hold() {
     for error in [0.0, 0.03] {
         let make = |ball: Ball| if error == 0.0 { sampled(lattice(), |p| ball.at(p)) } else { blurred(lattice(), |p| ball.at(p), error) };
         let (a, b) = (make(A), make(B));
-        let whole = union(&a, &b, &run).expect("a union");
+        let whole = union(&a, &b, PLENTY, &run).expect("a union");
         holds(&whole, |p| both(A, B, 1.0, p), "union");
-        let common = intersection(&a, &b, &run).expect("an intersection");
+        let common = intersection(&a, &b, PLENTY, &run).expect("an intersection");
         holds(&common, |p| both(A, B, -1.0, p), "intersection");
         let outside = complement(&whole).expect("a complement");
         holds(&outside, |p| -both(A, B, 1.0, p), "complement");
         // De Morgan, and a difference by its definition.
         let (not_a, not_b) = (complement(&a).expect("a field"), complement(&b).expect("a field"));
-        let again = intersection(&not_a, &not_b, &run).expect("an intersection");
+        let again = intersection(&not_a, &not_b, PLENTY, &run).expect("an intersection");
         assert_eq!(again.values(), outside.values());
         assert_eq!((again.lower(), again.upper()), (outside.lower(), outside.upper()));
-        let rest = difference(&a, &b, &run).expect("a difference");
-        let same = intersection(&a, &not_b, &run).expect("an intersection");
+        let rest = difference(&a, &b, PLENTY, &run).expect("a difference");
+        let same = intersection(&a, &not_b, PLENTY, &run).expect("an intersection");
         assert_eq!((rest.values(), rest.lower(), rest.upper()), (same.values(), same.lower(), same.upper()));
     }
 }
@@ -188,7 +188,7 @@ fn solids_are_combined_with_bounds_that_hold() {
 fn combined_bounds_are_tight_where_the_distance_is_known() {
     let run = Run::with_threads(2);
     let (a, b) = (sampled(lattice(), |p| A.at(p)), sampled(lattice(), |p| B.at(p)));
-    let whole = union(&a, &b, &run).expect("a union");
+    let whole = union(&a, &b, PLENTY, &run).expect("a union");
     let (mut outside, mut certain) = (0, 0);
     for n in 0..whole.values().len() {
         let (p, known) = (lattice().node(n), whole.interval(n));
@@ -215,9 +215,9 @@ fn solids_grow_and_shrink_with_bounds_that_hold() {
                 if error == 0.0 { sampled(lattice(), |p| both(A, B, side, p)) } else { blurred(lattice(), |p| both(A, B, side, p), error) }
             };
             // Two balls grow into two larger ones; what two balls share shrinks into what two smaller ones share.
-            let grown = offset(&make(1.0), by, &run).expect("a field");
+            let grown = offset(&make(1.0), by, PLENTY, &run).expect("a field");
             holds(&grown, |p| both(A.grown(by), B.grown(by), 1.0, p), &format!("grown by {by}, error {error}"));
-            let shrunk = offset(&make(-1.0), -by, &run).expect("a field");
+            let shrunk = offset(&make(-1.0), -by, PLENTY, &run).expect("a field");
             holds(&shrunk, |p| both(A.grown(-by), B.grown(-by), -1.0, p), &format!("shrunk by {by}, error {error}"));
             for n in (0..grown.values().len()).step_by(7) {
                 let truth = both(A.grown(by), B.grown(by), 1.0, lattice().node(n));
@@ -237,7 +237,7 @@ fn an_intersection_may_be_empty_and_a_union_everything() {
     let run = Run::with_threads(2);
     let far = Ball { center: DVec3::new(0.0, 0.0, 3.0), radius: 0.5 };
     let (a, b) = (sampled(lattice(), |p| A.at(p)), sampled(lattice(), |p| far.at(p)));
-    let nothing = intersection(&a, &b, &run).expect("a field");
+    let nothing = intersection(&a, &b, PLENTY, &run).expect("a field");
     for n in 0..nothing.values().len() {
         let known = nothing.interval(n);
         assert!(known.lower > 0.0 && known.upper == f64::INFINITY, "{known:?}");
@@ -286,7 +286,9 @@ fn results_do_not_depend_on_threads() {
         all.map(|array| array.into_iter().map(f32::to_bits).collect::<Vec<u32>>())
     };
     let jobs: [&Job<'_>; 4] =
-        [&|run| union(&a, &b, run), &|run| difference(&a, &b, run), &|run| offset(&a, 0.2, run), &|run| resample(&a, target, PLENTY, run)];
+        [&|run| union(&a, &b, PLENTY, run), &|run| difference(&a, &b, PLENTY, run), &|run| offset(&a, 0.2, PLENTY, run), &|run| {
+            resample(&a, target, PLENTY, run)
+        }];
     for job in jobs {
         check_threads("an operation", |run| Ok(bits(job(run)?))).unwrap_or_else(|broken| panic!("{broken}"));
     }
@@ -342,14 +344,23 @@ fn what_has_no_inside_is_not_combined() {
     let known = Known::Rounded { band: f64::INFINITY, doubtful: Vec::new() };
     let open = SampledField::new(lattice(), values, known, Continuity::ExceptOpenings).expect("a field");
     let closed = sampled(lattice(), |p| A.at(p));
-    assert!(matches!(union(&open, &closed, &run), Err(Error::Invalid(_))));
-    assert!(matches!(difference(&closed, &open, &run), Err(Error::Invalid(_))));
-    assert!(matches!(offset(&open, 1.0, &run), Err(Error::Invalid(_))));
+    assert!(matches!(union(&open, &closed, PLENTY, &run), Err(Error::Invalid(_))));
+    assert!(matches!(difference(&closed, &open, PLENTY, &run), Err(Error::Invalid(_))));
+    assert!(matches!(offset(&open, 1.0, PLENTY, &run), Err(Error::Invalid(_))));
     for bad in [f64::NAN, f64::INFINITY] {
-        assert!(matches!(offset(&closed, bad, &run), Err(Error::Invalid(_))));
+        assert!(matches!(offset(&closed, bad, PLENTY, &run), Err(Error::Invalid(_))));
     }
     let moved = sampled(Lattice { origin: lattice().origin + 1e-9, ..lattice() }, |p| A.at(p));
-    assert!(matches!(intersection(&closed, &moved, &run), Err(Error::Invalid(_))));
+    assert!(matches!(intersection(&closed, &moved, PLENTY, &run), Err(Error::Invalid(_))));
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let a = sampled(lattice(), |p| A.at(p));
+    let run = Run::default();
+    assert!(matches!(union(&a, &a, 1000, &run), Err(Error::Memory { .. })));
+    assert!(matches!(offset(&a, 0.1, 29 * lattice().len() as u64 - 1, &run), Err(Error::Memory { .. })));
+    assert!(offset(&a, 0.1, 29 * lattice().len() as u64, &run).is_ok());
 }
 
 #[test]

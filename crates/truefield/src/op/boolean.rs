@@ -12,19 +12,19 @@ use crate::run::Run;
 /// the other is farther away than its boundary: the nearest point of that boundary is then no part of the other.
 /// Elsewhere it is an upper bound, and the lower one follows from the samples around.
 ///
-/// Refuses fields on different lattices, and of meshes with openings.
-pub fn union(a: &SampledField, b: &SampledField, run: &Run<'_>) -> Result<SampledField> {
-    either(a, Turned::No, b, Turned::No, Turned::No, run)
+/// Takes 29 bytes a sample while it runs. Refuses fields on different lattices, and of meshes with openings.
+pub fn union(a: &SampledField, b: &SampledField, memory: u64, run: &Run<'_>) -> Result<SampledField> {
+    either([a, b], [Turned::No, Turned::No], Turned::No, memory, run)
 }
 
 /// What is in both solids: outside of the union of what is outside. As [`union`].
-pub fn intersection(a: &SampledField, b: &SampledField, run: &Run<'_>) -> Result<SampledField> {
-    either(a, Turned::InsideOut, b, Turned::InsideOut, Turned::InsideOut, run)
+pub fn intersection(a: &SampledField, b: &SampledField, memory: u64, run: &Run<'_>) -> Result<SampledField> {
+    either([a, b], [Turned::InsideOut, Turned::InsideOut], Turned::InsideOut, memory, run)
 }
 
 /// What is in `a` and not in `b`. As [`union`].
-pub fn difference(a: &SampledField, b: &SampledField, run: &Run<'_>) -> Result<SampledField> {
-    either(a, Turned::InsideOut, b, Turned::No, Turned::InsideOut, run)
+pub fn difference(a: &SampledField, b: &SampledField, memory: u64, run: &Run<'_>) -> Result<SampledField> {
+    either([a, b], [Turned::InsideOut, Turned::No], Turned::InsideOut, memory, run)
 }
 
 /// What is not in a solid: all signs changed. Exact where the field is.
@@ -37,14 +37,14 @@ pub fn complement(a: &SampledField) -> Result<SampledField> {
     SampledField::new(*a.lattice(), negative(a.values()), known, a.continuity())
 }
 
-fn either(a: &SampledField, turn_a: Turned, b: &SampledField, turn_b: Turned, result: Turned, run: &Run<'_>) -> Result<SampledField> {
+fn either([a, b]: [&SampledField; 2], turned: [Turned; 2], result: Turned, memory: u64, run: &Run<'_>) -> Result<SampledField> {
     check_solid(a)?;
     check_solid(b)?;
     if a.lattice() != b.lattice() {
         return Err(Error::invalid("the fields have their samples at different places; resample one onto the lattice of the other"));
     }
-    build(*a.lattice(), result, run, "combine fields", |number| {
-        let ((value_a, a), (value_b, b)) = (turn_a.sample(a, number), turn_b.sample(b, number));
+    build(*a.lattice(), result, memory, run, "combine fields", |number| {
+        let ((value_a, a), (value_b, b)) = (turned[0].sample(a, number), turned[1].sample(b, number));
         // Outside of both, or inside one and farther from the other than from its own boundary.
         let lower = if a.lower + b.lower > 0.0 { a.lower.min(b.lower) } else { f64::NEG_INFINITY };
         (value_a.min(value_b), Interval { lower, upper: a.upper.min(b.upper) })

@@ -11,6 +11,9 @@ use crate::run::Run;
 /// Samples a worker takes in one go.
 const CHUNK: usize = 1 << 15;
 
+/// Bytes that a sample takes in the making: bounds and value twice, where a bound comes from, and whether it is open.
+const BYTES: u64 = 29;
+
 /// A solid, or everything outside of it, which is a solid too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Turned {
@@ -43,15 +46,21 @@ pub(super) fn check_solid(field: &SampledField) -> Result<()> {
 
 /// The solid whose samples `sample` gives, `turned` back in the end.
 ///
-/// The lower bound of a sample may be minus infinity; then the other samples bound it as far as they can.
+/// The lower bound of a sample may be minus infinity; then the other samples bound it as far as they can. Takes 29 bytes a
+/// sample while it runs, 12 then; refuses more than `memory` bytes.
 pub(super) fn build(
     lattice: Lattice,
     turned: Turned,
+    memory: u64,
     run: &Run<'_>,
     phase: &'static str,
     sample: impl Fn(usize) -> (f32, Interval) + Sync,
 ) -> Result<SampledField> {
     let count = lattice.len();
+    let needed = (count as u64).saturating_mul(BYTES);
+    if needed > memory {
+        return Err(Error::Memory { what: format!("a field of {count} samples with bounds"), needed, allowed: memory });
+    }
     let mut rows = vec![[0.0f32; 3]; count];
     run.chunks(phase, &mut rows, CHUNK, |chunk, rows| {
         for (row, number) in rows.iter_mut().zip(chunk * CHUNK..) {
