@@ -226,6 +226,14 @@ def test_vti_of_others(tmp_path: Path, word: str, order: str) -> None:
         assert (volume.origin.tolist(), volume.spacing.tolist()) == ([10.5, 20, 30], [0.5, 2, 3])
 
 
+def test_compression_that_is_not_known_is_named(tmp_path: Path) -> None:
+    test_vti_of_others(tmp_path, "UInt64", "<")
+    data = (tmp_path / "a.vti").read_bytes().replace(b"<VTKFile ", b'<VTKFile compressor="vtkLZ4DataCompressor" ')
+    (tmp_path / "a.vti").write_bytes(data)
+    with pytest.raises(tf.FileError, match=r"a\.vti': it is compressed by vtkLZ4"):
+        tf.read_volume(tmp_path / "a.vti")
+
+
 def test_imagej_stacks_have_their_spacing(tmp_path: Path) -> None:
     from PIL import Image
 

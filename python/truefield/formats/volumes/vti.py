@@ -174,6 +174,8 @@ def _values(
         header = np.dtype(order + ("u8" if root.get("header_type") == "UInt64" else "u4"))
         try:
             data = _decoded(content, encoding, header, root.get("compressor"))
+        except FormatError:
+            raise
         except (zlib.error, lzma.LZMAError, binascii.Error, ValueError) as error:
             raise FormatError(f"its samples are damaged ({error}); copy it again") from None
         if len(data) != count * dtype.itemsize:
