@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and ter
 # Jobs of many minutes: only Ctrl-C ends them while the test waits.
 LONG = {
     "contour": ["--depth", "4", "--tolerance", "0.002", "-o", "{out}/shell.ply"],
+    "sample": ["--resolution", "700", "-o", "{out}/samples.nrrd"],
     "thickness": ["--above", "10", "--tolerance", "1e-7", "--output", "{out}/report"],
 }
 
