@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import paper
+from bench import paper, wavefronts
 from bench.clock import Peak
 from bench.judge import Judge
 
@@ -168,6 +168,7 @@ def heavy(threads: int, repeats: int) -> Table:
 
 JOBS: dict[str, Callable[..., Table]] = {
     "contours": contours, "memory": memory, "engine": engine, "fields": fields, "shells": shells, "heavy": heavy,
+    "wavefront": wavefronts.wavefront,
 }  # fmt: skip
 # These take each model; the others bring their own.
 WITH_MODEL = ("contours", "memory")
