@@ -120,3 +120,15 @@ def test_errors_are_one_sentence(part: tf.TriangleMesh) -> None:
         tf.complete_field(part, resolution=0)
     assert isinstance(caught.value, tf.TruefieldError)
     assert "\n" not in str(caught.value)
+
+
+def test_images_are_foreground_where_they_are_not_zero() -> None:
+    image = np.zeros((6, 5))
+    image[3:] = -7.5
+    steps = np.array([-2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
+    centers = tf.distance_transform(image, sampling=(0.5, 9.0), signed=True, surface="centers")
+    between = tf.distance_transform(image, sampling=(0.5, 9.0), signed=True, surface="between")
+    for found, nearest in ((centers, 1.0), (between, 0.5)):
+        outside, inside = -steps[:3] + nearest, -(steps[3:] - 1.0 + nearest)
+        np.testing.assert_array_equal(found[:, 2], 0.5 * np.concatenate([outside, inside]))
+    assert np.all(np.isinf(tf.distance_transform(np.ones((3, 3)))))
