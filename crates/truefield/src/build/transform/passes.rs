@@ -18,8 +18,8 @@ const SLAB: usize = 1 << 19;
 /// Voxels that a thread takes at once, at least.
 const TASK: usize = 1 << 16;
 
-/// Bytes of columns that are copied together, so that memory is read in longer pieces.
-const GATHER: usize = 1 << 18;
+/// Bytes of columns that are copied together, at most, so that memory is read in longer pieces.
+const GATHER: usize = 1 << 22;
 
 /// Solves a panel of this kind of number; and what the last pass does to it.
 trait Kind: Value {
