@@ -40,16 +40,19 @@ pub(super) fn tighten(lattice: &Lattice, lower: &mut [f32], run: &Run<'_>) -> Re
                 if !open[number] {
                     continue;
                 }
+                // Neighbours mostly have the same source: it is tried once.
+                let mut tried = from[number];
                 for way in &before {
                     let [a, b, c] = [i + sign * way[0], j + sign * way[1], k + sign * way[2]];
                     if !((0..nx).contains(&a) && (0..ny).contains(&b) && (0..nz).contains(&c)) {
                         continue;
                     }
                     let source = from[((a * ny + b) * nz + c) as usize];
-                    if source == NONE || source == from[number] {
+                    if source == NONE || source == tried || source == from[number] {
                         continue;
                     }
-                    let bound = handed(lattice, lower[source as usize], source as usize, [i, j, k]);
+                    tried = source;
+                    let bound = handed(lattice, lower[source as usize], source, [i, j, k]);
                     if bound > lower[number] {
                         (lower[number], from[number]) = (bound, source);
                     }
@@ -62,10 +65,11 @@ pub(super) fn tighten(lattice: &Lattice, lower: &mut [f32], run: &Run<'_>) -> Re
 }
 
 /// What the bound of sample `source` says of sample `to`, rounded down.
-fn handed(lattice: &Lattice, bound: f32, source: usize, to: [i64; 3]) -> f32 {
-    let [_, ny, nz] = lattice.shape.map(i64::from);
-    let source = source as i64;
-    let steps = [to[0] - source / (ny * nz), to[1] - source / nz % ny, to[2] - source % nz];
+fn handed(lattice: &Lattice, bound: f32, source: u32, to: [i64; 3]) -> f32 {
+    let [_, ny, nz] = lattice.shape;
+    let row = source / nz;
+    let from = [row / ny, row % ny, source % nz];
+    let steps: [i64; 3] = std::array::from_fn(|axis| to[axis] - i64::from(from[axis]));
     let way: f64 = (0..3).map(|axis| (steps[axis] as f64 * lattice.spacing[axis]).powi(2)).sum::<f64>().sqrt();
     crate::field::sampled::rounded_down(f64::from(bound) - way * (1.0 + 1e-12))
 }
