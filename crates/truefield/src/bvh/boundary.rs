@@ -76,6 +76,21 @@ impl Boundary {
         self.nodes[index].skip = self.nodes.len() as u32;
     }
 
+    /// A distance from `p` within which there is no edge; infinite where there is none at all.
+    pub fn gap(&self, p: DVec3) -> f64 {
+        let mut least = f64::INFINITY;
+        let mut index = 0;
+        while let Some(node) = self.nodes.get(index) {
+            let squared = node.bounds.distance_squared(p);
+            let leaf = node.skip as usize == index + 1;
+            if leaf {
+                least = least.min(squared);
+            }
+            index = if leaf || squared >= least { node.skip as usize } else { index + 1 };
+        }
+        least.sqrt() * (1.0 - 1e-12)
+    }
+
     /// A bound on the gradient of the winding number over the ball around `p` (per model unit);
     /// infinite where the ball reaches the box of a boundary edge.
     pub fn steepest(&self, p: DVec3, radius: f64) -> f64 {

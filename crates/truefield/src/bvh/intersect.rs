@@ -16,6 +16,12 @@ use crate::run::Run;
 /// Triangles a worker takes at once.
 const BLOCK: usize = 512;
 
+/// Pairs that meet that are looked for in every block; there is seldom a use for more.
+const ENOUGH: usize = 2048;
+
+/// Pairs that are compared for every block, on average over its triangles: more is not a surface but a heap.
+const COMPARED: usize = 1024 * BLOCK;
+
 /// Half an ulp of 1.
 const UNIT: f64 = f64::EPSILON / 2.0;
 
@@ -50,6 +56,17 @@ impl Meetings {
         Clearance { gap: load(gap), slope: load(slope) }
     }
 
+    /// Which of the triangles given as true meet no other but in a corner or an edge; none where not all were compared.
+    pub fn sound(&self, mut sound: Vec<bool>) -> Vec<bool> {
+        for t in self.pairs.iter().flatten() {
+            sound[*t as usize] = false;
+        }
+        if !self.complete {
+            sound.fill(false);
+        }
+        sound
+    }
+
     /// Gaps and slopes are kept in single precision, rounded down; as they are positive, their bits
     /// sort like their values, and the least does not depend on who comes first.
     fn keep(&self, triangle: u32, which: usize, value: f64) {
@@ -57,15 +74,14 @@ impl Meetings {
         self.clearance[triangle as usize][which].fetch_min(single.to_bits(), Ordering::Relaxed);
     }
 
-    /// Tests every pair of triangles of positive area (`solid`) that come within `reach` of each
-    /// other, `limit` finds for every block of triangles at most.
+    /// Tests every pair of `solid` triangles that come within `reach` of each other, of a mesh that was `moved`
+    /// so far from the one the tree is of.
     pub fn find(
         mesh: &TriangleMesh,
         topology: &Topology,
         tree: &Tree,
         solid: &[bool],
-        reach: f64,
-        limit: usize,
+        [reach, moved]: [f64; 2],
         run: &Run<'_>,
     ) -> Result<Self> {
         let count = mesh.triangles().len();
@@ -77,13 +93,13 @@ impl Meetings {
         };
         let blocks = run.blocks("self-intersections", count.div_ceil(BLOCK), |block| {
             let (mut found, mut near, mut stack) = (Vec::new(), Vec::new(), Vec::new());
-            let mut complete = true;
+            let (mut complete, mut compared) = (true, 0);
             for first in block * BLOCK..((block + 1) * BLOCK).min(count) {
                 if !solid[first] {
                     continue;
                 }
                 run.cancel.check()?;
-                if found.len() >= limit {
+                if found.len() >= ENOUGH || compared >= COMPARED {
                     complete = false;
                     break;
                 }
@@ -91,12 +107,13 @@ impl Meetings {
                 near.clear();
                 let box_of = |t: u32| Aabb::around(mesh.corners(t));
                 let wide = box_of(first).grow(reach * 1.001);
-                tree.overlapping(&wide, &mut stack, |t| {
+                tree.overlapping(&wide.grow(2.0 * moved), &mut stack, |t| {
                     if t > first && solid[t as usize] && wide.overlaps(&box_of(t)) {
                         near.push(t);
                     }
                 });
                 near.sort_unstable();
+                compared += near.len();
                 for &second in &near {
                     if !meetings.part(mesh, topology, [first, second], reach) {
                         found.push([first, second]);

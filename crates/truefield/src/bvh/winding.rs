@@ -235,7 +235,8 @@ pub fn triangle(corners: &[DVec3; 3], p: DVec3) -> Estimate {
     let lengths = la * lb * lc;
     let numerator = a.dot(b.cross(c));
     let denominator = lengths + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    let size = numerator.hypot(denominator);
+    // As in lanes, so that both doubt the same triangles.
+    let size = (numerator * numerator + denominator * denominator).sqrt();
     let noise = TRIANGLE_ROUNDING * lengths;
     // Too near a corner or an edge, or in the plane of the triangle: either side.
     if size <= 8.0 * noise || lengths < 1e-130 || (denominator < 8.0 * noise && numerator.abs() <= noise) {

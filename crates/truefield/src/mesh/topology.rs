@@ -23,6 +23,8 @@ pub(crate) struct Topology {
     pub triangles: Vec<[u32; 3]>,
     /// Sides of all triangles with three different corners, sorted by edge, then by triangle.
     sides: Vec<TriangleSide>,
+    /// Number of vertices of the mesh.
+    vertices: usize,
 }
 
 /// Triangles over the same three welded corners.
@@ -54,7 +56,7 @@ impl Topology {
             }
         }
         sides.sort_unstable_by_key(|s| (s.ends, s.triangle));
-        Self { triangles, sides }
+        Self { triangles, sides, vertices: mesh.vertices().len() }
     }
 
     /// The sides that lie on one edge, edge by edge, in the order of their ends.
@@ -65,6 +67,30 @@ impl Topology {
     /// Whether every edge is run along as often one way as the other.
     pub fn is_closed(&self) -> bool {
         self.edges().all(|sides| 2 * sides.iter().filter(|side| side.forward).count() == sides.len())
+    }
+
+    /// By vertex: whether triangles meet there that are not joined by edges around it.
+    pub fn pinched(&self) -> Vec<bool> {
+        // Corners joined across edges make fans; a vertex with two fans is pinched.
+        let mut corners = Sets::new(3 * self.triangles.len());
+        for sides in self.edges() {
+            for end in sides[0].ends {
+                let corner_at = |t: u32| 3 * t + (0..3).find(|&k| self.triangles[t as usize][k as usize] == end).unwrap_or(0);
+                for side in &sides[1..] {
+                    corners.join(corner_at(sides[0].triangle), corner_at(side.triangle));
+                }
+            }
+        }
+        let mut fan = vec![u32::MAX; self.vertices];
+        let mut pinched = vec![false; self.vertices];
+        for (t, welded) in self.triangles.iter().enumerate().filter(|(_, welded)| !collapsed(welded)) {
+            for (k, &v) in welded.iter().enumerate() {
+                let root = corners.find((3 * t + k) as u32);
+                pinched[v as usize] |= fan[v as usize] != u32::MAX && fan[v as usize] != root;
+                fan[v as usize] = root;
+            }
+        }
+        pinched
     }
 
     /// Groups of two or more triangles over the same corners.

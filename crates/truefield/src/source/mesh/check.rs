@@ -16,9 +16,6 @@ use super::well_sized;
 /// Finds that are named; the others are only counted.
 const NAMED: usize = 8;
 
-/// Self-intersections that are looked for in every 512 triangles; there is seldom a use for more.
-const ENOUGH: usize = 2048;
-
 /// How many of something there are, and the first few.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found<T> {
@@ -110,7 +107,7 @@ impl Check {
         let winding = Winding::build(&Layers::new(mesh, &topology).corners(mesh), run)?;
         check.add_shells(mesh, &topology, &winding, run)?;
         let tree = Tree::build(mesh, run)?;
-        check.add_intersections(mesh, &topology, &tree, ENOUGH, run)?;
+        check.add_intersections(mesh, &topology, &tree, 0.0, run)?;
         check.area /= scale * scale;
         check.volume /= scale * scale * scale;
         Ok(check)
@@ -177,34 +174,12 @@ impl Check {
         for v in (0..used.len()).filter(|&v| !used[v]) {
             self.unreferenced_vertices.add(v as u32);
         }
-        // Corners joined across edges make fans; a vertex with two fans is pinched.
-        let mut corners = Sets::new(3 * topology.triangles.len());
-        for sides in topology.edges() {
-            for end in sides[0].ends {
-                let corner_at = |t: u32| 3 * t + (0..3).find(|&k| topology.triangles[t as usize][k as usize] == end).unwrap_or(0);
-                for side in &sides[1..] {
-                    corners.join(corner_at(sides[0].triangle), corner_at(side.triangle));
-                }
-            }
-        }
-        let mut fan = vec![u32::MAX; mesh.vertices().len()];
-        let mut pinched = vec![false; mesh.vertices().len()];
-        for (t, welded) in topology.triangles.iter().enumerate() {
-            for (k, &v) in welded.iter().enumerate() {
-                if collapsed(welded) {
-                    continue;
-                }
-                let root = corners.find((3 * t + k) as u32);
-                pinched[v as usize] |= fan[v as usize] != u32::MAX && fan[v as usize] != root;
-                fan[v as usize] = root;
-            }
-        }
         let mut position = vec![false; mesh.vertices().len()];
         for &v in topology.triangles.iter().flatten() {
             position[v as usize] = true;
         }
         self.positions = position.iter().filter(|&&there| there).count();
-        for v in (0..pinched.len()).filter(|&v| pinched[v]) {
+        for (v, _) in topology.pinched().into_iter().enumerate().filter(|(_, pinched)| *pinched) {
             self.pinched_vertices.add(v as u32);
         }
     }
@@ -238,38 +213,38 @@ impl Check {
         const CHUNK: usize = 64;
         let middles = run.blocks("shells", shells.len().div_ceil(CHUNK), |block| {
             let part = &shells[block * CHUNK..((block + 1) * CHUNK).min(shells.len())];
-            Ok(part.iter().map(|&(s, t)| closed[s as usize].then(|| average(winding, &mesh.corners(t)))).collect::<Vec<_>>())
+            let middle = |t: u32| between(winding, &mesh.corners(t), 0.05).filter(|&(_, error)| error < 0.1);
+            Ok(part.iter().map(|&(s, t)| closed[s as usize].then(|| middle(t))).collect::<Vec<_>>())
         })?;
         for ((s, _), middle) in shells.into_iter().zip(middles.into_iter().flatten()) {
             match middle {
-                Some(w) if w < 0.25 => self.inside_out_shells.add(s),
-                Some(w) if w > 0.75 => self.nested_shells.add(s),
-                Some(w) if w.is_nan() => self.uncertain_shells.add(s),
+                Some(Some((w, _))) if w < 0.25 => self.inside_out_shells.add(s),
+                Some(Some((w, _))) if w > 0.75 => self.nested_shells.add(s),
+                Some(None) => self.uncertain_shells.add(s),
                 _ => {}
             }
         }
         Ok(())
     }
 
-    /// Looks for self-intersections, `limit` in every block of triangles at most.
+    /// Looks for self-intersections of a mesh that was `moved` so far from the one the tree is of.
     pub(crate) fn add_intersections(
         &mut self,
         mesh: &TriangleMesh,
         topology: &Topology,
         tree: &Tree,
-        limit: usize,
+        moved: f64,
         run: &Run<'_>,
     ) -> Result<Meetings> {
-        let mut solid: Vec<bool> = (0..self.triangles as u32).map(|t| !flat(&mesh.corners(t))).collect();
+        let mut solid: Vec<bool> = topology.triangles.iter().map(|welded| !collapsed(welded)).collect();
         for copies in topology.copies() {
-            let (even, odd) = (copies.even, copies.odd);
-            for t in even.into_iter().chain(odd).skip(1) {
+            for &t in copies.even.iter().chain(&copies.odd).skip(1) {
                 solid[t as usize] = false;
             }
         }
         let reach = (mesh.extent().diagonal() * REACH).max(64.0 * rounding(mesh));
-        let meetings = Meetings::find(mesh, topology, tree, &solid, reach, limit, run)?;
-        for &pair in &meetings.pairs {
+        let meetings = Meetings::find(mesh, topology, tree, &solid, [reach, moved], run)?;
+        for &pair in meetings.pairs.iter().filter(|pair| pair.iter().all(|&t| !flat(&mesh.corners(t)))) {
             self.self_intersections.add(pair);
         }
         self.self_intersections_complete = meetings.complete;
@@ -303,7 +278,10 @@ impl Check {
             (one(&self.uncertain_shells, "of triangle"), "shell too near others to be placed", "shells too near others to be placed"),
             (pair(&self.self_intersections), "pair of triangles that meet or nearly meet", "pairs of triangles that meet or nearly meet"),
         ];
-        let ((count, first), singular, plural) = faults.into_iter().find(|((count, _), ..)| *count > 0)?;
+        let Some(((count, first), singular, plural)) = faults.into_iter().find(|((count, _), ..)| *count > 0) else {
+            let all = self.self_intersections_complete;
+            return (!all).then(|| "so many triangles come near each other that they were not all compared".into());
+        };
         let most = if self.self_intersections_complete { "" } else { "at least " };
         let what = if count == 1 { singular } else { plural };
         Some(format!("{most}{count} {what} ({})", first.unwrap_or_default()))
@@ -314,18 +292,20 @@ impl Check {
 const REACH: f64 = 1.0 / 1_048_576.0;
 
 /// Whether a triangle has no area, up to rounding.
-fn flat(corners: &[DVec3; 3]) -> bool {
+pub(crate) fn flat(corners: &[DVec3; 3]) -> bool {
     let [a, b, c] = *corners;
     let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
     (b - a).cross(c - a).length() <= 8.0 * f64::EPSILON * longest
 }
 
-/// The mean of the winding numbers on the two sides of a triangle: its own share there is half up, half down,
-/// so it is left out. NaN where other triangles are too near to say.
-fn average(winding: &Winding, corners: &[DVec3; 3]) -> f64 {
+/// The mean of the winding numbers on the two sides of a triangle that counts once, at its middle, and how wrong it may
+/// be, `accuracy` if it can be had: the triangle's own share there is half up, half down, so it is left out.
+pub(crate) fn between(winding: &Winding, corners: &[DVec3; 3], accuracy: f64) -> Option<(f64, f64)> {
     let [a, b, c] = *corners;
     let at = a + ((b - a) + (c - a)) / 3.0;
     let own = triangle(corners, at);
-    let all = winding.number(at, own.error + 0.05);
-    if all.error - own.error < 0.1 { all.value - own.value } else { f64::NAN }
+    let all = winding.number(at, own.error + accuracy);
+    // A triangle that is too near to count is so in the sum as well: its doubt is there, and its share is not.
+    let error = if own.doubt > 0.0 { (all.error - own.error).max(0.0) } else { all.error + own.error };
+    (error < 0.25).then_some((all.value - own.value, error))
 }

@@ -4,6 +4,8 @@ use crate::geom::DVec3;
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::{Sets, Topology, collapsed};
 
+use super::check::flat;
+
 /// What the winding sum runs over.
 #[derive(Clone, Debug)]
 pub(crate) struct Layers {
@@ -67,6 +69,20 @@ impl Layers {
             }
         }
         Self { triangles: (0..count as u32).filter(|&t| weight[t as usize] != 0).collect(), boundary }
+    }
+
+    /// By triangle of the mesh: whether it counts, has an area and is alone in its place.
+    pub fn alone(&self, mesh: &TriangleMesh, topology: &Topology) -> Vec<bool> {
+        let mut alone = vec![false; topology.triangles.len()];
+        for &t in &self.triangles {
+            alone[t as usize] = !flat(&mesh.corners(t));
+        }
+        for copies in topology.copies() {
+            for &t in copies.even.iter().chain(&copies.odd) {
+                alone[t as usize] = false;
+            }
+        }
+        alone
     }
 
     /// The corners of the triangles that count.

@@ -35,6 +35,15 @@ impl Pseudonormal {
     }
 }
 
+/// What is proven about the triangles of a mesh.
+pub(crate) struct Proof<'a> {
+    pub meetings: &'a Meetings,
+    /// Whether a triangle counts once in the winding number and meets others in corners and edges only.
+    pub sound: &'a [bool],
+    /// How far the mesh was moved to decide sides.
+    pub moved: f64,
+}
+
 /// The pseudonormals of a mesh on its welded topology.
 #[derive(Clone, Debug)]
 pub(crate) struct Pseudonormals {
@@ -44,15 +53,15 @@ pub(crate) struct Pseudonormals {
     corner_of: Vec<[u32; 3]>,
     edges: Vec<Pseudonormal>,
     corners: Vec<Pseudonormal>,
-    /// Proven room by triangle; empty when the rule is not proven for the mesh.
+    /// Proven room by triangle; empty when nothing is proven.
     room: Vec<[f32; 2]>,
     /// How far a nearest point may be off.
     rounding: f64,
 }
 
 impl Pseudonormals {
-    /// For any mesh; `meetings` of a mesh for which the rule is proven.
-    pub fn new(mesh: &TriangleMesh, topology: &Topology, meetings: Option<&Meetings>) -> Self {
+    /// For any mesh. With a proof, only corners and edges around which the surface is whole are given a normal.
+    pub fn new(mesh: &TriangleMesh, topology: &Topology, proof: Option<&Proof<'_>>) -> Self {
         let count = topology.triangles.len();
         let mut corners = vec![Pseudonormal::default(); mesh.vertices().len()];
         for (t, welded) in topology.triangles.iter().enumerate() {
@@ -66,8 +75,27 @@ impl Pseudonormals {
         let mut edge_of = vec![[u32::MAX; 3]; count];
         let mut edges = Vec::new();
         let mut ends = Vec::new();
+        if let Some(Proof { sound, .. }) = proof {
+            let unsound = topology.triangles.iter().zip(*sound).filter(|(welded, sound)| !**sound && !collapsed(welded));
+            for &corner in unsound.flat_map(|(welded, _)| welded) {
+                corners[corner as usize].error = f64::INFINITY;
+            }
+            for (corner, pinched) in corners.iter_mut().zip(topology.pinched()) {
+                if pinched {
+                    corner.error = f64::INFINITY;
+                }
+            }
+        }
         for sides in topology.edges() {
             let mut sum = Pseudonormal::default();
+            if let Some(Proof { sound, .. }) = proof
+                && !matches!(sides, [a, b] if a.forward != b.forward && sound[a.triangle as usize] && sound[b.triangle as usize])
+            {
+                sum.error = f64::INFINITY;
+                for end in sides[0].ends {
+                    corners[end as usize].error = f64::INFINITY;
+                }
+            }
             for side in sides {
                 edge_of[side.triangle as usize][usize::from(side.side)] = edges.len() as u32;
                 sum.add(face(&mesh.corners(side.triangle)), PI);
@@ -84,15 +112,21 @@ impl Pseudonormals {
                 }
             }
         }
-        let room = meetings.map_or_else(Vec::new, |m| {
+        let room = proof.map_or_else(Vec::new, |proof| {
             (0..count as u32)
                 .map(|t| {
-                    let Clearance { gap, slope } = m.clearance(t);
-                    [gap as f32, slope as f32]
+                    let Clearance { gap, slope } = proof.meetings.clearance(t);
+                    if proof.sound[t as usize] { [gap as f32, slope as f32] } else { [0.0; 2] }
                 })
                 .collect()
         });
-        Self { edge_of, corner_of: topology.triangles.clone(), edges, corners, room, rounding: rounding(mesh) }
+        let rounding = rounding(mesh) + 2.0 * proof.map_or(0.0, |proof| proof.moved);
+        Self { edge_of, corner_of: topology.triangles.clone(), edges, corners, room, rounding }
+    }
+
+    /// How far a nearest point may be off.
+    pub fn rounding(&self) -> f64 {
+        self.rounding
     }
 
     /// The side of `p`, whose nearest point is `nearest` on `triangle`: positive outside, negative inside;

@@ -12,7 +12,8 @@ use crate::run::Run;
 
 use super::check::Check;
 use super::layers::Layers;
-use super::pseudonormal::Pseudonormals;
+use super::pseudonormal::{Proof, Pseudonormals};
+use super::walls::{Wall, walls};
 
 /// How the user wants sides to be decided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,14 +86,33 @@ impl Side {
 #[derive(Clone, Debug)]
 pub(crate) struct Signs {
     rule: SignRule,
-    /// Where the rule is pseudonormals.
-    pseudonormals: Option<Pseudonormals>,
-    /// Absent where sides are not asked for. Decides what pseudonormals leave open.
-    winding: Option<Sum>,
+    /// Absent where sides are not asked for.
+    decided: Option<Decided>,
     /// Whether nothing but the surface parts inside from outside.
     parted: bool,
     /// No side is certain nearer to the surface than this: vertices were joined to decide sides.
     blur: f64,
+}
+
+/// What decides sides: pseudonormals where they are proven, else winding numbers.
+#[derive(Clone, Debug)]
+struct Decided {
+    normals: Pseudonormals,
+    walls: Walls,
+    sum: Sum,
+    /// The mesh that sides are decided on, where it is not the mesh itself.
+    joined: Option<TriangleMesh>,
+}
+
+/// What pseudonormals mean.
+#[derive(Clone, Debug)]
+enum Walls {
+    /// Nothing is proven: they were asked for.
+    Trusted,
+    /// The whole mesh is sound: outside is outside, everywhere.
+    Clean,
+    /// Each triangle has its own.
+    Known(Vec<Wall>),
 }
 
 /// Winding numbers and what is known about the chain of edges that bounds the surface.
@@ -108,60 +128,35 @@ impl Signs {
     pub fn new(mesh: &TriangleMesh, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
         if choice == SignChoice::Unsigned {
             let reason = "sides were not asked for: distances are positive everywhere".into();
-            return Ok(Self {
-                rule: SignRule { kind: SignKind::Unsigned, reason },
-                pseudonormals: None,
-                winding: None,
-                parted: true,
-                blur: 0.0,
-            });
+            return Ok(Self { rule: SignRule { kind: SignKind::Unsigned, reason }, decided: None, parted: true, blur: 0.0 });
         }
         let mut topology = Topology::new(mesh);
         run.cancel.check()?;
         let joined = if choice == SignChoice::Pseudonormal || topology.is_closed() { None } else { join_vertices(mesh)? };
-        let blur = joined.as_ref().map_or(0.0, |joined| BLUR * joined.within);
-        let (mesh, note) = match &joined {
-            None => (mesh, None),
-            Some(Joined { mesh: closer, within }) => {
-                topology = Topology::new(closer);
-                (closer, Some(format!("vertices within {within:.1e} of each other were taken for one to decide sides")))
-            }
-        };
+        let moved = joined.as_ref().map_or(0.0, |joined| joined.within);
+        let mesh = joined.as_ref().map_or(mesh, |joined| &joined.mesh);
+        if joined.is_some() {
+            topology = Topology::new(mesh);
+        }
         let layers = Layers::new(mesh, &topology);
         let winding = Winding::build(&layers.corners(mesh), run)?;
         let boundary = Boundary::new(mesh, &layers.boundary);
         let closed = boundary.is_empty();
         let sum = Sum { winding, boundary, extent: mesh.extent() };
-        if choice == SignChoice::Winding {
-            let note = note.map_or_else(String::new, |note| format!("; {note}"));
-            let reason = format!("winding numbers were asked for; they hold for every mesh{note}");
-            return Ok(Self {
-                rule: SignRule { kind: SignKind::Winding, reason },
-                pseudonormals: None,
-                winding: Some(sum),
-                parted: closed,
-                blur,
-            });
-        }
-        if let Some(note) = note {
-            let end = if closed { "which closes the mesh" } else { "and the mesh is still open" };
-            let reason = format!("{note}, {end}; inside is where the winding number is beyond 1/2");
-            let rule = SignRule { kind: SignKind::Winding, reason };
-            return Ok(Self { rule, pseudonormals: None, winding: Some(sum), parted: closed, blur });
-        }
-        let proof = prove(mesh, &topology, tree, &sum.winding, run)?;
-        let (kind, reason) = match (&proof, choice) {
-            (Ok(_), _) => (SignKind::Pseudonormal, "the mesh is closed, consistently oriented and free of self-intersections".into()),
-            (Err(fault), SignChoice::Pseudonormal) => {
-                (SignKind::Pseudonormal, format!("pseudonormals were asked for, but sides are not proven on this mesh: {fault}"))
-            }
-            (Err(fault), _) => {
-                (SignKind::Winding, format!("{fault}: pseudonormals would not be proven; inside is where the winding number is beyond 1/2"))
-            }
+        let (fault, meetings) = look(mesh, &topology, tree, &sum.winding, moved, run)?;
+        let rule = rule(choice, fault.as_deref(), joined.as_ref(), closed);
+        let (normals, walls) = if fault.is_some() && rule.kind == SignKind::Pseudonormal {
+            (Pseudonormals::new(mesh, &topology, None), Walls::Trusted)
+        } else {
+            let sound = meetings.sound(layers.alone(mesh, &topology));
+            let proof = Proof { meetings: &meetings, sound: &sound, moved };
+            let normals = Pseudonormals::new(mesh, &topology, Some(&proof));
+            let known = || walls(mesh, &topology, &sound, &sum.winding, &sum.boundary, run).map(Walls::Known);
+            (normals, if fault.is_none() { Walls::Clean } else { known()? })
         };
-        let parted = closed && !(proof.is_err() && kind == SignKind::Pseudonormal);
-        let pseudonormals = (kind == SignKind::Pseudonormal).then(|| Pseudonormals::new(mesh, &topology, proof.as_ref().ok()));
-        Ok(Self { rule: SignRule { kind, reason }, pseudonormals, winding: Some(sum), parted, blur })
+        let parted = closed && !matches!(walls, Walls::Trusted);
+        let decided = Decided { normals, walls, sum, joined: joined.map(|joined| joined.mesh) };
+        Ok(Self { rule, decided: Some(decided), parted, blur: BLUR * moved })
     }
 
     /// Which rule decides, and why.
@@ -171,33 +166,39 @@ impl Signs {
 
     /// The side of `p`, whose nearest point is `nearest` on `triangle`.
     pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
-        let Some(sum) = &self.winding else { return Side::Outside };
-        if nearest.distance_squared <= self.blur * self.blur {
-            return if sum.side(p).sign() < 0.0 { Side::PerhapsInside } else { Side::PerhapsOutside };
+        let Some(decided) = &self.decided else { return Side::Outside };
+        if self.blurred(nearest) {
+            return if decided.sum.side(p).sign() < 0.0 { Side::PerhapsInside } else { Side::PerhapsOutside };
         }
-        match self.pseudonormals.as_ref().and_then(|n| n.side(mesh, p, nearest, triangle)) {
-            Some(height) if height < 0.0 => Side::Inside,
-            Some(_) => Side::Outside,
-            None => sum.side(p),
-        }
+        decided.near(mesh, p, nearest, triangle).map_or_else(|| decided.sum.side(p), |(side, _)| side)
     }
 
     /// The side of every point of the ball around `p`, which does not touch the surface, if they all have one.
     pub fn side_of_ball(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> Option<Side> {
-        match &self.winding {
-            Some(_) if self.parted => Some(self.side(mesh, p, nearest, triangle)).filter(|side| side.is_certain()),
+        let Some(decided) = &self.decided else { return Some(Side::Outside) };
+        if self.parted {
+            return Some(self.side(mesh, p, nearest, triangle)).filter(|side| side.is_certain());
+        }
+        match decided.walls {
             // Pseudonormals that are not proven may change their mind anywhere.
-            Some(sum) => self.pseudonormals.is_none().then(|| sum.side_of_ball(p, radius)).flatten(),
-            None => Some(Side::Outside),
+            Walls::Trusted => None,
+            _ if self.blurred(nearest) => None,
+            _ => match decided.near(mesh, p, nearest, triangle) {
+                Some((side, carry)) if carry >= radius => Some(side),
+                _ => decided.sum.side_of_ball(p, radius),
+            },
         }
     }
 
     /// The side of `p`, and the length of the paths from it that stay on that side as long as they stay off the
     /// surface; paths longer than `radius` are not asked for.
     pub fn steady(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> (Side, f64) {
-        match &self.winding {
-            Some(sum) if !self.parted && self.pseudonormals.is_none() && nearest.distance_squared > self.blur * self.blur => {
-                sum.steady(p, radius)
+        match &self.decided {
+            Some(decided) if !self.parted && !matches!(decided.walls, Walls::Trusted) && !self.blurred(nearest) => {
+                match decided.near(mesh, p, nearest, triangle) {
+                    Some((side, carry)) if carry >= WORTH * radius => (side, carry),
+                    _ => decided.sum.steady(p, radius),
+                }
             }
             _ => {
                 let side = self.side(mesh, p, nearest, triangle);
@@ -206,30 +207,74 @@ impl Signs {
         }
     }
 
+    /// Whether the point is so near that joining vertices may have turned its side.
+    fn blurred(&self, nearest: &FacetPoint) -> bool {
+        nearest.distance_squared <= self.blur * self.blur
+    }
+
     /// Whether the side can change at the surface only.
     pub fn changes_at_surface_only(&self) -> bool {
         self.parted
     }
 }
 
-/// Proves pseudonormals for the mesh, cheap conditions first, or says what is in the way.
-fn prove(
+/// The first thing that keeps pseudonormals from being proven for the whole mesh, cheap conditions first, and where its triangles meet.
+fn look(
     mesh: &TriangleMesh,
     topology: &Topology,
     tree: &Tree,
     winding: &Winding,
+    moved: f64,
     run: &Run<'_>,
-) -> Result<std::result::Result<Meetings, String>> {
+) -> Result<(Option<String>, Meetings)> {
     let mut check = Check::of_edges(mesh, topology);
-    if let Some(fault) = check.fault() {
-        return Ok(Err(fault));
+    let mut fault = check.fault();
+    if fault.is_none() {
+        check.add_shells(mesh, topology, winding, run)?;
+        fault = check.fault();
     }
-    check.add_shells(mesh, topology, winding, run)?;
-    if let Some(fault) = check.fault() {
-        return Ok(Err(fault));
+    let meetings = check.add_intersections(mesh, topology, tree, moved, run)?;
+    Ok((fault.or_else(|| check.fault()), meetings))
+}
+
+/// The rule, and why it is in force.
+fn rule(choice: SignChoice, fault: Option<&str>, joined: Option<&Joined>, closed: bool) -> SignRule {
+    let note = joined.map(|joined| format!("vertices within {:.1e} of each other were taken for one to decide sides", joined.within));
+    let (kind, reason) = match (choice, fault, note) {
+        (SignChoice::Winding, _, note) => {
+            let note = note.map_or_else(String::new, |note| format!("; {note}"));
+            (SignKind::Winding, format!("winding numbers were asked for; they hold for every mesh{note}"))
+        }
+        (_, _, Some(note)) => {
+            let end = if closed { "which closes the mesh" } else { "and the mesh is still open" };
+            (SignKind::Winding, format!("{note}, {end}; inside is where the winding number is beyond 1/2"))
+        }
+        (_, None, None) => (SignKind::Pseudonormal, "the mesh is closed, consistently oriented and free of self-intersections".into()),
+        (SignChoice::Pseudonormal, Some(fault), None) => {
+            (SignKind::Pseudonormal, format!("pseudonormals were asked for, but sides are not proven on this mesh: {fault}"))
+        }
+        (_, Some(fault), None) => {
+            (SignKind::Winding, format!("{fault}: pseudonormals would not be proven; inside is where the winding number is beyond 1/2"))
+        }
+    };
+    SignRule { kind, reason }
+}
+
+impl Decided {
+    /// The side of `p` by its nearest triangle, and the length of paths off the surface that stay on it; `None` where the
+    /// triangle cannot tell.
+    fn near(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<(Side, f64)> {
+        let wall = match &self.walls {
+            Walls::Trusted | Walls::Clean => Wall::CLEAN,
+            Walls::Known(walls) => walls[triangle as usize],
+        };
+        let left = f64::from(wall.reach) - nearest.distance_squared.sqrt() * (1.0 + 1e-9) - self.normals.rounding();
+        if left <= 0.0 {
+            return None;
+        }
+        let height = self.normals.side(self.joined.as_ref().unwrap_or(mesh), p, nearest, triangle)?;
+        Some((wall.side(height), left))
     }
-    let meetings = check.add_intersections(mesh, topology, tree, 1, run)?;
-    Ok(check.fault().map_or(Ok(meetings), Err))
 }
 
 impl Sum {
@@ -273,6 +318,9 @@ impl Sum {
         decided(e).then(|| guess(e).certain())
     }
 }
+
+/// A side that carries less than this part of what is asked for is asked of the winding number.
+const WORTH: f64 = 0.25;
 
 /// Vertices so many ulp of the largest coordinate apart are taken for one: what exporters leave behind.
 const NOISE: f64 = 8.0 * f64::EPSILON;
@@ -413,7 +461,7 @@ mod tests {
         for wild in [0.0, 0.5, 0.8, 1.0] {
             let asked = Asked::new(star(wild, 0), SignChoice::Auto);
             assert_eq!(asked.signs.rule.kind, SignKind::Pseudonormal, "{wild}: {}", asked.signs.rule.reason);
-            let (normals, sum) = (asked.signs.pseudonormals.as_ref().expect("normals"), asked.signs.winding.as_ref().expect("a sum"));
+            let Decided { normals, sum, .. } = asked.signs.decided.as_ref().expect("a rule");
             let mut r = random(17);
             let (mut both, mut left) = (0, 0);
             for _ in 0..150_000 {
@@ -432,6 +480,86 @@ mod tests {
             }
             // Pseudonormals leave next to nothing that is off the surface to the winding number.
             assert!(both > 100_000 && left < 300, "{wild}: {both} {left}");
+        }
+    }
+
+    /// Several meshes in one, each moved and turned inside out or not.
+    fn together(parts: &[(&TriangleMesh, DVec3, bool)]) -> TriangleMesh {
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for &(mesh, by, flipped) in parts {
+            let first = vertices.len() as u32;
+            vertices.extend(mesh.vertices().iter().map(|&v| v + by));
+            triangles.extend(mesh.triangles().iter().map(|t| {
+                let [a, b, c] = t.map(|v| v + first);
+                if flipped { [a, c, b] } else { [a, b, c] }
+            }));
+        }
+        TriangleMesh::new(vertices, triangles).expect("a mesh")
+    }
+
+    /// What keeps a mesh from being proven as a whole, and how much of it must be known all the same.
+    fn faulty() -> Vec<(&'static str, TriangleMesh, f64)> {
+        let (whole, far) = (star(0.4, 0), DVec3::X * 5.0);
+        let small = TriangleMesh::new(whole.vertices().iter().map(|v| v * 0.05).collect(), whole.triangles().to_vec()).expect("a mesh");
+        let mut holes = whole.triangles().to_vec();
+        holes.retain({
+            let mut r = random(3);
+            move |_| r() > 0.03
+        });
+        let mut copied = whole.triangles().to_vec();
+        copied.extend_from_slice(&whole.triangles()[40..60]);
+        copied.extend(whole.triangles()[100..110].iter().map(|&[a, b, c]| [a, c, b]));
+        let mut turned = whole.triangles().to_vec();
+        turned[77..80].iter_mut().for_each(|t| t.swap(0, 1));
+        let mut seams: Vec<DVec3> = whole.triangles().iter().flat_map(|t| t.map(|v| whole.vertices()[v as usize])).collect();
+        seams.iter_mut().enumerate().filter(|(i, _)| i % 5 == 0).for_each(|(_, v)| *v *= 1.0 + f64::EPSILON);
+        let torn = (0..seams.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let with = |triangles| TriangleMesh::new(whole.vertices().to_vec(), triangles).expect("a mesh");
+        vec![
+            ("open", star(0.3, 2), 0.3),
+            ("half", star(0.3, 7), 0.2),
+            ("holes", with(holes), 0.01),
+            ("copies", with(copied), 0.3),
+            ("turned", with(turned), 0.3),
+            ("seams", TriangleMesh::new(seams, torn).expect("a mesh"), 0.6),
+            ("crossing", together(&[(&whole, DVec3::ZERO, false), (&whole, DVec3::new(0.4, 0.1, 0.2), false)]), 0.3),
+            ("nested", together(&[(&whole, DVec3::ZERO, false), (&small, DVec3::ZERO, false)]), 0.6),
+            ("inside out", together(&[(&whole, DVec3::ZERO, true), (&small, far, false)]), 0.6),
+            ("crossing, one inside out", together(&[(&whole, DVec3::ZERO, true), (&whole, DVec3::new(0.4, 0.1, 0.2), false)]), 0.3),
+            ("open beside whole", together(&[(&star(0.3, 7), DVec3::ZERO, false), (&whole, far, false)]), 0.4),
+        ]
+    }
+
+    #[test]
+    fn walls_and_winding_numbers_never_disagree() {
+        for (what, mesh, least) in faulty() {
+            let asked = Asked::new(mesh, SignChoice::Auto);
+            let Decided { sum, walls, .. } = asked.signs.decided.as_ref().expect("a rule");
+            let decided = asked.signs.decided.as_ref().expect("a rule");
+            assert!(asked.signs.rule.kind == SignKind::Winding && !matches!(walls, Walls::Trusted), "{what}: {}", asked.signs.rule.reason);
+            let size = asked.mesh.extent().diagonal();
+            let mut r = random(29);
+            let (mut asked_near, mut known) = (0, 0);
+            for index in 0..60_000 {
+                let far = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * (0.2 * size);
+                let p = if index % 3 == 0 { asked.near(&mut r) + far } else { asked.near(&mut r) };
+                let (foot, triangle) = asked.foot(p);
+                if asked.signs.blurred(&foot) {
+                    continue;
+                }
+                asked_near += 1;
+                let Some((side, carry)) = decided.near(&asked.mesh, p, &foot, triangle) else { continue };
+                known += 1;
+                assert!(side.is_certain() && carry > 0.0);
+                let by_sum = sum.side(p);
+                assert!(by_sum == side || !by_sum.is_certain(), "{what} at {p}: {side:?}, {by_sum:?}, {foot:?} of {triangle}");
+                // Along any path off the surface that is not too long.
+                let step = carry.min(foot.distance_squared.sqrt()) * 0.999;
+                let q = p + DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5).normalize_or_zero() * step;
+                let there = sum.side(q);
+                assert!(there == side || !there.is_certain(), "{what} from {p} to {q}: {side:?}, {there:?}");
+            }
+            assert!(f64::from(known) >= least * f64::from(asked_near), "{what}: {known} of {asked_near}");
         }
     }
 
