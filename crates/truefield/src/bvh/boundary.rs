@@ -3,6 +3,10 @@
 //! The gradient of the solid angle is a Biot-Savart integral over the boundary chain, so that of the
 //! winding number at x is at most `1/(4 pi) * sum of times * integral over the edge of dl / |x - y|^2`.
 //! Where the boundary is empty the winding number is constant on everything that stays off the surface.
+//!
+//! Far from a group of edges what counts is their sum as vectors, which is zero for a closed loop: with
+//! K(r) = r / |r|^3, whose derivative is at most 2 / |r|^3, replacing K(y - x) by K(c - x) for the middle c of the group
+//! leaves at most `2 |y - c| / gap^3` for every unit of length.
 
 use std::f64::consts::PI;
 
@@ -24,17 +28,19 @@ struct Node {
     bounds: Aabb,
     /// Length of the edges, each as many times as it counts.
     length: f64,
+    /// Length of their sum as vectors.
+    sum: f64,
     skip: u32,
 }
 
 impl Boundary {
     /// From directed edges and how many times each counts.
     pub fn new(mesh: &TriangleMesh, edges: &[([u32; 2], u32)]) -> Self {
-        let mut items: Vec<(Aabb, f64)> = edges
+        let mut items: Vec<(Aabb, DVec3)> = edges
             .iter()
             .map(|&(ends, times)| {
                 let [a, b] = ends.map(|v| mesh.vertices()[v as usize]);
-                (Aabb::around([a, b]), (b - a).length() * f64::from(times) * (1.0 + 1e-12))
+                (Aabb::around([a, b]), (b - a) * f64::from(times))
             })
             .collect();
         let mut boundary = Self::default();
@@ -49,10 +55,13 @@ impl Boundary {
         self.nodes.is_empty()
     }
 
-    fn add(&mut self, items: &mut [(Aabb, f64)]) {
+    fn add(&mut self, items: &mut [(Aabb, DVec3)]) {
         let index = self.nodes.len();
         let bounds = items.iter().fold(Aabb::EMPTY, |b, item| b.union(item.0));
-        self.nodes.push(Node { bounds, length: items.iter().map(|item| item.1).sum::<f64>() * (1.0 + 1e-9), skip: 0 });
+        let length = items.iter().map(|item| item.1.length()).sum::<f64>() * (1.0 + 1e-9);
+        // Rounding of coordinates may keep a loop from closing.
+        let sum = items.iter().map(|item| item.1).sum::<DVec3>().length() + length * 1e-9;
+        self.nodes.push(Node { bounds, length, sum, skip: 0 });
         if items.len() > LEAF {
             let size = bounds.size();
             let axis = if size.x >= size.y.max(size.z) {
@@ -69,8 +78,8 @@ impl Boundary {
             self.add(right);
         } else if items.len() > 1 {
             for item in items {
-                let skip = self.nodes.len() as u32 + 1;
-                self.nodes.push(Node { bounds: item.0, length: item.1, skip });
+                let (skip, length) = (self.nodes.len() as u32 + 1, item.1.length() * (1.0 + 1e-9));
+                self.nodes.push(Node { bounds: item.0, length, sum: length, skip });
             }
         }
         self.nodes[index].skip = self.nodes.len() as u32;
@@ -100,11 +109,12 @@ impl Boundary {
             let leaf = node.skip as usize == index + 1;
             let gap = node.bounds.distance_squared(p).sqrt() * (1.0 - 1e-12) - radius;
             // Far for its size: at most a quarter is given away.
-            if leaf || gap > 4.0 * node.bounds.diagonal() {
+            let size = node.bounds.diagonal();
+            if leaf || gap > 4.0 * size {
                 if gap <= 0.0 {
                     return f64::INFINITY;
                 }
-                sum += node.length / (gap * gap);
+                sum += node.length.min(node.sum + node.length * size / gap) / (gap * gap);
                 index = node.skip as usize;
             } else {
                 index += 1;

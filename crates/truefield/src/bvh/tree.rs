@@ -100,6 +100,11 @@ impl Tree {
         self.facet_at(self.slots[triangle as usize])
     }
 
+    /// The triangles of each leaf, neighbours in space.
+    pub(crate) fn leaves(&self) -> impl Iterator<Item = &[u32]> {
+        self.packets.iter().map(|packet| &self.triangles[packet.first as usize..(packet.first + packet.count) as usize])
+    }
+
     #[inline(always)]
     pub(crate) fn facet_at(&self, slot: Slot) -> &Facet {
         &self.facets[slot.0 as usize]

@@ -151,7 +151,7 @@ impl Signs {
             let sound = meetings.sound(layers.alone(mesh, &topology));
             let proof = Proof { meetings: &meetings, sound: &sound, moved };
             let normals = Pseudonormals::new(mesh, &topology, Some(&proof));
-            let known = || walls(mesh, &topology, &sound, &sum.winding, &sum.boundary, run).map(Walls::Known);
+            let known = || walls(mesh, &topology, tree, &sound, &sum.winding, &sum.boundary, run).map(Walls::Known);
             (normals, if fault.is_none() { Walls::Clean } else { known()? })
         };
         let parted = closed && !matches!(walls, Walls::Trusted);

@@ -6,6 +6,7 @@
 //! winding number serves a whole piece of surface: it is handed on from triangle to triangle across
 //! sound edges, along a path just above them, as long as what it may change on the way is small.
 
+use crate::bvh::Tree;
 use crate::bvh::boundary::Boundary;
 use crate::bvh::winding::Winding;
 use crate::error::Result;
@@ -23,8 +24,11 @@ const HANDED: f64 = 0.15;
 /// A winding number that is asked for is asked to within this.
 const ASKED: f64 = 0.05;
 
-/// Triangles a worker takes at once.
-const CHUNK: usize = 1024;
+/// Too near to the boundary for a group of triangles may still be far enough for one of them.
+const STEEP: f64 = 0.02;
+
+/// Groups of triangles a worker takes at once.
+const CHUNK: usize = 256;
 
 /// What a triangle parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,56 +53,87 @@ impl Wall {
     }
 }
 
-/// A triangle's place and what the winding number can change over it.
+/// A ball around a triangle, or around some, and how fast the winding number can change in it.
 #[derive(Clone, Copy)]
 struct Spot {
     center: DVec3,
     radius: f64,
     /// Infinite where the triangle is not sound or touches an edge that bounds the surface.
-    change: f64,
+    steepest: f64,
+}
+
+impl Spot {
+    /// As steep as `known`, or as the boundary says where that is too steep.
+    fn around(corners: &[DVec3], boundary: &Boundary, known: f64) -> Self {
+        let center = corners[0] + corners.iter().map(|&v| v - corners[0]).sum::<DVec3>() / corners.len() as f64;
+        let radius = corners.iter().map(|&v| (v - center).length()).fold(0.0, f64::max) * (1.0 + 1e-12);
+        let steepest = if known * radius < STEEP { known } else { boundary.steepest(center, radius) };
+        Self { center, radius, steepest }
+    }
 }
 
 /// The walls of all triangles. O(n), and one winding number for each sound piece of a closed surface.
 pub(crate) fn walls(
     mesh: &TriangleMesh,
     topology: &Topology,
+    tree: &Tree,
     sound: &[bool],
     winding: &Winding,
     boundary: &Boundary,
     run: &Run<'_>,
 ) -> Result<Vec<Wall>> {
-    let count = sound.len();
-    let chunk = |block: usize| block * CHUNK..((block + 1) * CHUNK).min(count);
-    let spots: Vec<Spot> = run
-        .blocks("walls", count.div_ceil(CHUNK), |block| {
-            let spot = |t: usize| {
-                let corners = mesh.corners(t as u32);
-                let center = corners[0] + ((corners[1] - corners[0]) + (corners[2] - corners[0])) / 3.0;
-                let radius = corners.iter().map(|&v| (v - center).length()).fold(0.0, f64::max) * (1.0 + 1e-12);
-                let change = if sound[t] { boundary.steepest(center, radius) * radius } else { f64::INFINITY };
-                Spot { center, radius, change }
-            };
-            Ok(chunk(block).map(spot).collect::<Vec<_>>())
-        })?
-        .into_iter()
-        .flatten()
-        .collect();
-    let known = hand_on(mesh, topology, &spots, winding, run)?;
-    let walls = run.blocks("walls", count.div_ceil(CHUNK), |block| {
-        Ok(chunk(block).map(|t| wall(&spots[t], known[t], boundary)).collect::<Vec<_>>())
+    // Triangles of a leaf share what is known of the boundary.
+    let groups = tree.leaves().map(|triangles| triangles.iter().copied().filter(|&t| sound[t as usize]).collect::<Vec<u32>>());
+    let groups: Vec<Vec<u32>> = groups.filter(|group| !group.is_empty()).collect();
+    let chunk = |block: usize| &groups[block * CHUNK..((block + 1) * CHUNK).min(groups.len())];
+    let found = run.blocks("walls", groups.len().div_ceil(CHUNK), |block| {
+        let spots = chunk(block).iter().map(|group| {
+            let corners: Vec<DVec3> = group.iter().flat_map(|&t| mesh.corners(t)).collect();
+            let all = Spot::around(&corners, boundary, f64::INFINITY);
+            let each: Vec<Spot> = corners.chunks_exact(3).map(|corners| Spot::around(corners, boundary, all.steepest)).collect();
+            (all, each)
+        });
+        Ok(spots.collect::<Vec<_>>())
     })?;
-    Ok(walls.into_iter().flatten().collect())
+    let (groups_at, each): (Vec<Spot>, Vec<Vec<Spot>>) = found.into_iter().flatten().unzip();
+    let mut spots = vec![Spot { center: DVec3::ZERO, radius: 0.0, steepest: f64::INFINITY }; sound.len()];
+    for (group, each) in groups.iter().zip(each) {
+        for (&t, spot) in group.iter().zip(each) {
+            spots[t as usize] = spot;
+        }
+    }
+    let known = hand_on(mesh, topology, &spots, winding, run)?;
+    let reached = run.blocks("walls", groups.len().div_ceil(CHUNK), |block| {
+        let start = block * CHUNK;
+        let each = chunk(block).iter().zip(&groups_at[start..]).map(|(group, at)| {
+            let mut steps = Steps::new(at, boundary);
+            group
+                .iter()
+                .map(|&t| known[t as usize].map_or(Wall::UNKNOWN, |known| steps.wall(&spots[t as usize], known)))
+                .collect::<Vec<_>>()
+        });
+        Ok(each.collect::<Vec<_>>())
+    })?;
+    let mut walls = vec![Wall::UNKNOWN; sound.len()];
+    for (group, each) in groups.iter().zip(reached.into_iter().flatten()) {
+        for (&t, wall) in group.iter().zip(each) {
+            walls[t as usize] = wall;
+        }
+    }
+    Ok(walls)
 }
 
 /// The winding number on the outer side of each triangle at its middle, and how wrong it may be.
 fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], winding: &Winding, run: &Run<'_>) -> Result<Vec<Option<(f64, f64)>>> {
-    let mut across = vec![[u32::MAX; 3]; spots.len()];
+    let mut across = vec![[(u32::MAX, DVec3::ZERO); 3]; spots.len()];
     for sides in topology.edges() {
         if let [a, b] = sides
             && a.forward != b.forward
         {
-            across[a.triangle as usize][usize::from(a.side)] = b.triangle;
-            across[b.triangle as usize][usize::from(b.side)] = a.triangle;
+            let [from, to] = a.ends.map(|v| mesh.vertices()[v as usize]);
+            let middle = from + (to - from) * 0.5;
+            across[a.triangle as usize][usize::from(a.side)] = (b.triangle, middle);
+            across[b.triangle as usize][usize::from(b.side)] = (a.triangle, middle);
         }
     }
     let mut known: Vec<Option<(f64, f64)>> = vec![None; spots.len()];
@@ -107,7 +142,7 @@ fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], winding: &W
         if seed % CHUNK == 0 {
             run.cancel.check()?;
         }
-        if known[seed].is_some() || spots[seed].change > 0.5 {
+        if known[seed].is_some() || spots[seed].steepest * spots[seed].radius > 0.5 {
             continue;
         }
         let Some((value, error)) = between(winding, &mesh.corners(seed as u32), ASKED).filter(|&(_, error)| error <= HANDED) else {
@@ -117,9 +152,11 @@ fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], winding: &W
         queue.push_back(seed);
         while let Some(t) = queue.pop_front() {
             let Some((value, error)) = known[t] else { continue };
-            for next in across[t].map(|next| next as usize) {
+            for (next, middle) in across[t] {
+                let next = next as usize;
                 if next < spots.len() && known[next].is_none() {
-                    let error = error + (spots[t].change + spots[next].change) * (1.0 + 1e-9);
+                    let step = |spot: &Spot| (middle - spot.center).length() * spot.steepest;
+                    let error = error + (step(&spots[t]) + step(&spots[next])) * (1.0 + 1e-9);
                     if error <= HANDED {
                         known[next] = Some((value, error));
                         queue.push_back(next);
@@ -131,20 +168,44 @@ fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], winding: &W
     Ok(known)
 }
 
-fn wall(spot: &Spot, known: Option<(f64, f64)>, boundary: &Boundary) -> Wall {
-    let Some((value, error)) = known else { return Wall::UNKNOWN };
-    let whole = value.round();
-    // What the winding number may change before it could pass a half.
-    let left = 0.5 - (value - whole).abs() - error - 1e-9;
-    if left <= 0.0 {
-        return Wall::UNKNOWN;
+/// Balls around a group of triangles, each with a bound on how fast the winding number changes in it; found when asked for.
+struct Steps<'a> {
+    boundary: &'a Boundary,
+    center: DVec3,
+    gap: f64,
+    steepest: [Option<f64>; SHARES.len()],
+}
+
+/// Radii of the balls, as parts of the distance to the nearest edge that bounds the surface.
+const SHARES: [f64; 5] = [0.8, 0.6, 0.4, 0.25, 0.15];
+
+impl<'a> Steps<'a> {
+    fn new(at: &Spot, boundary: &'a Boundary) -> Self {
+        Self { boundary, center: at.center, gap: boundary.gap(at.center), steepest: [None; SHARES.len()] }
     }
-    if boundary.is_empty() {
-        return Wall { winding: whole as i32, reach: f32::INFINITY };
+
+    fn wall(&mut self, spot: &Spot, (value, error): (f64, f64)) -> Wall {
+        let winding = value.round() as i32;
+        // What the winding number may change before it could pass a half.
+        let left = 0.5 - (value - value.round()).abs() - error - 1e-9;
+        if left <= 0.0 {
+            return Wall::UNKNOWN;
+        }
+        if self.boundary.is_empty() {
+            return Wall { winding, reach: f32::INFINITY };
+        }
+        let off = (spot.center - self.center).length() * (1.0 + 1e-9);
+        let mut best = 0.0f64;
+        for (share, steepest) in SHARES.into_iter().zip(&mut self.steepest) {
+            // Paths from the middle of the triangle that stay in the ball.
+            let room = share * self.gap - off;
+            if room <= best {
+                break;
+            }
+            let steepest = *steepest.get_or_insert_with(|| self.boundary.steepest(self.center, share * self.gap));
+            best = best.max(room.min(left / steepest));
+        }
+        let reach = best * (1.0 - 1e-9) - spot.radius;
+        if reach > 0.0 { Wall { winding, reach: (reach as f32).next_down() } } else { Wall::UNKNOWN }
     }
-    let gap = boundary.gap(spot.center);
-    let holds = |length: f64| boundary.steepest(spot.center, length) * length < left;
-    let lengths = [0.8, 0.64, 0.5, 0.4, 0.32, 0.25, 0.2, 0.16, 0.12].map(|share| share * gap);
-    let length = lengths.into_iter().take_while(|&length| length > spot.radius).find(|&length| holds(length));
-    length.map_or(Wall::UNKNOWN, |length| Wall { winding: whole as i32, reach: ((length - spot.radius) as f32).next_down().max(0.0) })
 }
