@@ -13,14 +13,14 @@ use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
 
-/// Triangles a worker takes at once.
-const BLOCK: usize = 512;
+/// Leaves a worker takes at once.
+const BLOCK: usize = 64;
 
 /// Pairs that meet that are looked for in every block; there is seldom a use for more.
 const ENOUGH: usize = 2048;
 
-/// Pairs that are compared for every block, on average over its triangles: more is not a surface but a heap.
-const COMPARED: usize = 1024 * BLOCK;
+/// Pairs that are compared for every block: more is not a surface but a heap.
+const COMPARED: usize = 1024 * WIDTH * BLOCK;
 
 /// Half an ulp of 1.
 const UNIT: f64 = f64::EPSILON / 2.0;
@@ -84,48 +84,38 @@ impl Meetings {
         [reach, moved]: [f64; 2],
         run: &Run<'_>,
     ) -> Result<Self> {
-        let count = mesh.triangles().len();
         let open = |value: f64| AtomicU32::new((value as f32).next_down().max(0.0).to_bits());
         let mut meetings = Self {
             pairs: Vec::new(),
             complete: true,
             clearance: solid.iter().map(|&s| if s { [open(reach), open(1.0)] } else { [open(0.0), open(0.0)] }).collect(),
         };
+        let leaves = Leaves { mesh, tree, margin: 0.5005 * reach + moved };
+        let count = tree.packets.len();
         let blocks = run.blocks("self-intersections", count.div_ceil(BLOCK), |block| {
             let (mut found, mut near, mut stack) = (Vec::new(), Vec::new(), Vec::new());
-            let (mut complete, mut compared) = (true, 0);
+            let mut compared = 0;
             for first in block * BLOCK..((block + 1) * BLOCK).min(count) {
-                if !solid[first] {
-                    continue;
-                }
                 run.cancel.check()?;
                 if found.len() >= ENOUGH || compared >= COMPARED {
-                    complete = false;
-                    break;
+                    return Ok((found, false));
                 }
-                let first = first as u32;
                 near.clear();
-                let box_of = |t: u32| Aabb::around(mesh.corners(t));
-                let wide = box_of(first).grow(reach * 1.001);
-                tree.overlapping(&wide.grow(2.0 * moved), &mut stack, |t| {
-                    if t > first && solid[t as usize] && wide.overlaps(&box_of(t)) {
-                        near.push(t);
-                    }
-                });
-                near.sort_unstable();
+                leaves.pairs(first as u32, &mut stack, &mut near);
                 compared += near.len();
-                for &second in &near {
-                    if !meetings.part(mesh, topology, [first, second], reach) {
-                        found.push([first, second]);
+                for &pair in near.iter().filter(|pair| pair.iter().all(|&t| solid[t as usize])) {
+                    if !meetings.part(mesh, topology, pair, reach) {
+                        found.push(pair);
                     }
                 }
             }
-            Ok((found, complete))
+            Ok((found, true))
         })?;
         for (found, complete) in blocks {
             meetings.pairs.extend(found);
             meetings.complete &= complete;
         }
+        meetings.pairs.sort_unstable();
         Ok(meetings)
     }
 
@@ -170,38 +160,81 @@ impl Meetings {
     }
 }
 
-impl Tree {
-    /// Calls `visit` for every triangle whose box may share a point with `bounds`, and for some others;
-    /// `stack` is scratch.
-    pub(crate) fn overlapping(&self, bounds: &Aabb, stack: &mut Vec<u32>, mut visit: impl FnMut(u32)) {
-        let outward = |x: f64, up: bool| if up { (x as f32).next_up() } else { (x as f32).next_down() };
-        let min: [f32; 3] = std::array::from_fn(|axis| outward(bounds.min[axis] - self.center[axis], false));
-        let max: [f32; 3] = std::array::from_fn(|axis| outward(bounds.max[axis] - self.center[axis], true));
+/// Finds triangles whose boxes come near each other, leaf against leaf.
+struct Leaves<'a> {
+    mesh: &'a TriangleMesh,
+    tree: &'a Tree,
+    /// Boxes are grown by this on all sides.
+    margin: f64,
+}
+
+/// Boxes of the triangles of a leaf in lanes, as in a [`Node`].
+struct Boxes {
+    min: [[f32; WIDTH]; 3],
+    max: [[f32; WIDTH]; 3],
+}
+
+impl Leaves<'_> {
+    fn boxes(&self, leaf: u32) -> Boxes {
+        let packet = &self.tree.packets[leaf as usize];
+        let mut boxes = Boxes { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
+        for lane in 0..packet.count as usize {
+            let around = Aabb::around(self.mesh.corners(packet.triangle[lane])).grow(self.margin);
+            for axis in 0..3 {
+                boxes.min[axis][lane] = ((around.min[axis] - self.tree.center[axis]) as f32).next_down();
+                boxes.max[axis][lane] = ((around.max[axis] - self.tree.center[axis]) as f32).next_up();
+            }
+        }
+        boxes
+    }
+
+    /// Adds all pairs of a triangle of `leaf` and one of it or of a later leaf, the lower index first.
+    fn pairs(&self, leaf: u32, stack: &mut Vec<u32>, pairs: &mut Vec<[u32; 2]>) {
+        let own = self.boxes(leaf);
+        let triangles = &self.tree.packets[leaf as usize].triangle;
+        let count = self.tree.packets[leaf as usize].count as usize;
+        // The tree's own boxes are not grown.
+        let margin = (1.0001 * self.margin) as f32 + f32::MIN_POSITIVE;
+        let min: [f32; 3] = std::array::from_fn(|axis| (own.min[axis].iter().copied().fold(f32::INFINITY, f32::min) - margin).next_down());
+        let max: [f32; 3] =
+            std::array::from_fn(|axis| (own.max[axis].iter().copied().fold(f32::NEG_INFINITY, f32::max) + margin).next_up());
         stack.clear();
         stack.push(0);
         while let Some(child) = stack.pop() {
-            if child & LEAF != 0 {
-                let packet = &self.packets[(child & !LEAF) as usize];
-                // Unused lanes repeat the last triangle.
-                let mut last = u32::MAX;
-                for &t in &packet.triangle {
-                    if t != last {
-                        visit(t);
-                    }
-                    last = t;
-                }
+            if child & LEAF == 0 {
+                let node = &self.tree.nodes[child as usize];
+                let hit = overlapping(&node.min, &node.max, &min, &max);
+                stack.extend((0..WIDTH).filter(|&lane| hit[lane] && node.child[lane] != ABSENT).map(|lane| node.child[lane]));
                 continue;
             }
-            let node = &self.nodes[child as usize];
-            let mut hit = [true; WIDTH];
-            for axis in 0..3 {
-                for (lane, hit) in hit.iter_mut().enumerate() {
-                    *hit &= (node.min[axis][lane] <= max[axis]) & (node.max[axis][lane] >= min[axis]);
+            let other = child & !LEAF;
+            if other < leaf {
+                continue;
+            }
+            let boxes = self.boxes(other);
+            let others = &self.tree.packets[other as usize].triangle;
+            for lane in 0..count {
+                let corner = |bounds: &[[f32; WIDTH]; 3]| std::array::from_fn(|axis| bounds[axis][lane]);
+                let hit = overlapping(&boxes.min, &boxes.max, &corner(&own.min), &corner(&own.max));
+                for at in (0..WIDTH).filter(|&at| hit[at] && (other > leaf || at > lane)) {
+                    let (a, b) = (triangles[lane], others[at]);
+                    pairs.push([a.min(b), a.max(b)]);
                 }
             }
-            stack.extend((0..WIDTH).filter(|&lane| hit[lane] && node.child[lane] != ABSENT).map(|lane| node.child[lane]));
         }
     }
+}
+
+/// Which of the boxes in lanes share a point with one box.
+#[inline(always)]
+fn overlapping(mins: &[[f32; WIDTH]; 3], maxs: &[[f32; WIDTH]; 3], min: &[f32; 3], max: &[f32; 3]) -> [bool; WIDTH] {
+    let mut hit = [true; WIDTH];
+    for axis in 0..3 {
+        for (lane, hit) in hit.iter_mut().enumerate() {
+            *hit &= (mins[axis][lane] <= max[axis]) & (maxs[axis][lane] >= min[axis]);
+        }
+    }
+    hit
 }
 
 /// A length that the distance of two triangles is proven to exceed, at most `enough`; 0 if there is none.
@@ -275,6 +308,10 @@ fn slopes_at_corner(first: [DVec3; 2], second: [DVec3; 2]) -> [f64; 2] {
         }
         best[0].min(best[1]) > STEEP
     };
+    // Between the two wedges: the one that most often holds, with room.
+    if try_plane(a[0] + a[1] - b[0] - b[1]) {
+        return best;
+    }
     let upright = [na.cross(a[0]), a[1].cross(na), b[0].cross(nb), nb.cross(b[1])];
     let planes = upright.into_iter().chain([na, -na, nb, -nb]);
     let across = a.into_iter().flat_map(|x| b.into_iter().flat_map(move |y| [x.cross(y), y.cross(x)]));

@@ -15,6 +15,7 @@
 //! `1/(4 pi) * B / R^4 * sum over k >= 2 of (k+1) t^(k-2) = B / (4 pi R^4) * (3 - 2t) / (1 - t)^2`.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI};
+use std::sync::{Mutex, PoisonError};
 
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3};
@@ -26,6 +27,9 @@ const WIDTH: usize = 8;
 
 /// Marks a child that is a leaf.
 const LEAF: u32 = 1 << 31;
+
+/// Marks a child that is not there.
+const ABSENT: u32 = u32::MAX;
 
 /// Half an ulp of 1.
 const UNIT: f64 = f64::EPSILON / 2.0;
@@ -127,10 +131,27 @@ impl Winding {
     pub fn build(triangles: &[[DVec3; 3]], run: &Run<'_>) -> Result<Self> {
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         let middles: Vec<DVec3> = triangles.iter().map(middle).collect();
-        let mut builder = Builder { triangles, middles: &middles, nodes: Vec::new(), packets: Vec::new() };
-        builder.node(&mut order, run)?;
-        let Builder { nodes, packets, .. } = builder;
-        Ok(Self { nodes, packets, count: triangles.len() })
+        let parts: Vec<Mutex<&mut [u32]>> = divide(&mut order, &middles).into_iter().map(Mutex::new).collect();
+        // The children of the root side by side.
+        let children = run.blocks("winding numbers", parts.len(), |index| {
+            let mut part = parts[index].lock().unwrap_or_else(PoisonError::into_inner);
+            let mut builder = Builder { triangles, middles: &middles, nodes: Vec::new(), packets: Vec::new() };
+            let (child, moments) = builder.child(&mut part, run)?;
+            Ok((child, moments, builder.radius(&part, &moments), part.len(), builder.nodes, builder.packets))
+        })?;
+        let mut whole = Self { nodes: vec![Node::EMPTY], packets: Vec::new(), count: triangles.len() };
+        for (lane, (child, moments, radius, count, nodes, packets)) in children.into_iter().enumerate() {
+            let (first, leaf) = (whole.nodes.len() as u32, whole.packets.len() as u32);
+            let moved = |child: u32| match child {
+                ABSENT => ABSENT,
+                packet if packet & LEAF != 0 => packet + leaf,
+                node => node + first,
+            };
+            whole.nodes[0].set(lane, moved(child), &moments, radius, count);
+            whole.nodes.extend(nodes.into_iter().map(|node| Node { child: node.child.map(moved), ..node }));
+            whole.packets.extend(packets);
+        }
+        Ok(whole)
     }
 
     /// The winding number around `p`, to within `accuracy` where rounding allows it; the error is
@@ -330,35 +351,30 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Adds a node over the triangles of `order` and returns its index and moments.
-    fn node(&mut self, order: &mut [u32], run: &Run<'_>) -> Result<(u32, Moments)> {
+    /// Adds the node or leaf over the triangles of `order` and returns its name and moments.
+    fn child(&mut self, order: &mut [u32], run: &Run<'_>) -> Result<(u32, Moments)> {
+        if order.len() <= WIDTH {
+            return Ok(self.packet(order));
+        }
         if order.len() > 4096 {
             run.cancel.check()?;
         }
         let index = self.nodes.len();
         self.nodes.push(Node::EMPTY);
-        let mut parts: Vec<&mut [u32]> = vec![order];
-        while parts.len() < WIDTH {
-            let largest = (0..parts.len()).rev().max_by_key(|&i| parts[i].len()).filter(|&i| parts[i].len() > WIDTH);
-            let Some(largest) = largest else { break };
-            let part = parts.swap_remove(largest);
-            let (left, right) = self.halve(part);
-            parts.push(left);
-            parts.push(right);
-        }
         let mut all = Vec::with_capacity(WIDTH);
-        for (lane, part) in parts.into_iter().filter(|part| !part.is_empty()).enumerate() {
-            let (child, moments) = if part.len() <= WIDTH { self.packet(part) } else { self.node(part, run)? };
-            let radius = part
-                .iter()
-                .flat_map(|&t| self.triangles[t as usize])
-                .map(|v| (v - moments.center).length_squared())
-                .fold(0.0, f64::max)
-                .sqrt();
+        for (lane, part) in divide(order, self.middles).into_iter().enumerate() {
+            let (child, moments) = self.child(part, run)?;
+            let radius = self.radius(part, &moments);
             self.nodes[index].set(lane, child, &moments, radius, part.len());
             all.push(moments);
         }
         Ok((index as u32, Moments::sum(&all)))
+    }
+
+    /// Radius of the ball around the centre of some triangles that holds them.
+    fn radius(&self, part: &[u32], moments: &Moments) -> f64 {
+        let corners = part.iter().flat_map(|&t| self.triangles[t as usize]);
+        corners.map(|v| (v - moments.center).length_squared()).fold(0.0, f64::max).sqrt()
     }
 
     fn packet(&mut self, order: &[u32]) -> (u32, Moments) {
@@ -378,23 +394,35 @@ impl Builder<'_> {
         self.packets.push(packet);
         (LEAF | (self.packets.len() - 1) as u32, Moments::sum(&all))
     }
+}
 
-    /// Halves by count along the longest axis.
-    fn halve<'o>(&self, order: &'o mut [u32]) -> (&'o mut [u32], &'o mut [u32]) {
-        let size = Aabb::around(order.iter().map(|&t| self.middles[t as usize])).size();
-        let axis = if size.x >= size.y.max(size.z) {
-            0
-        } else if size.y >= size.z {
-            1
-        } else {
-            2
-        };
-        let half = (order.len() / 2).next_multiple_of(WIDTH).min(order.len() - 1);
-        order.select_nth_unstable_by(half, |&a, &b| {
-            self.middles[a as usize][axis].total_cmp(&self.middles[b as usize][axis]).then(a.cmp(&b))
-        });
-        order.split_at_mut(half)
+/// Up to eight parts of even size, none empty.
+fn divide<'o>(order: &'o mut [u32], middles: &[DVec3]) -> Vec<&'o mut [u32]> {
+    let mut parts = vec![order];
+    while parts.len() < WIDTH {
+        let largest = (0..parts.len()).rev().max_by_key(|&i| parts[i].len()).filter(|&i| parts[i].len() > WIDTH);
+        let Some(largest) = largest else { break };
+        let (left, right) = halve(parts.swap_remove(largest), middles);
+        parts.push(left);
+        parts.push(right);
     }
+    parts.retain(|part| !part.is_empty());
+    parts
+}
+
+/// Halves by count along the longest axis.
+fn halve<'o>(order: &'o mut [u32], middles: &[DVec3]) -> (&'o mut [u32], &'o mut [u32]) {
+    let size = Aabb::around(order.iter().map(|&t| middles[t as usize])).size();
+    let axis = if size.x >= size.y.max(size.z) {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
+    let half = (order.len() / 2).next_multiple_of(WIDTH).min(order.len() - 1);
+    order.select_nth_unstable_by(half, |&a, &b| middles[a as usize][axis].total_cmp(&middles[b as usize][axis]).then(a.cmp(&b)));
+    order.split_at_mut(half)
 }
 
 impl Node {
@@ -406,7 +434,7 @@ impl Node {
         spread: [0.0; WIDTH],
         rounding: [0.0; WIDTH],
         most: [0.0; WIDTH],
-        child: [u32::MAX; WIDTH],
+        child: [ABSENT; WIDTH],
     };
 
     fn set(&mut self, lane: usize, child: u32, m: &Moments, radius: f64, count: usize) {
@@ -544,7 +572,7 @@ mod tests {
                 let p = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * 10f64.powf(3.0 * r());
                 let mut lanes = Values { value: [0.0; WIDTH], error: [0.0; WIDTH] };
                 node_values(node, p, &mut lanes);
-                for lane in (0..WIDTH).filter(|&lane| node.child[lane] & LEAF != 0 && node.child[lane] != u32::MAX) {
+                for lane in (0..WIDTH).filter(|&lane| node.child[lane] & LEAF != 0 && node.child[lane] != ABSENT) {
                     let packet = &winding.packets[(node.child[lane] & !LEAF) as usize];
                     let (mut sum, mut error) = (0.0, 0.0);
                     for k in 0..packet.count {

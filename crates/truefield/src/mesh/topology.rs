@@ -1,5 +1,7 @@
 //! Which triangles meet where: vertices welded by position, sides sorted by edge.
 
+use std::sync::OnceLock;
+
 use crate::geom::DVec3;
 use crate::mesh::TriangleMesh;
 
@@ -25,6 +27,8 @@ pub(crate) struct Topology {
     sides: Vec<TriangleSide>,
     /// Number of vertices of the mesh.
     vertices: usize,
+    copies: OnceLock<Vec<Copies>>,
+    pinched: OnceLock<Vec<bool>>,
 }
 
 /// Triangles over the same three welded corners.
@@ -55,8 +59,8 @@ impl Topology {
                 });
             }
         }
-        sides.sort_unstable_by_key(|s| (s.ends, s.triangle));
-        Self { triangles, sides, vertices: mesh.vertices().len() }
+        let sides = by_edge(&sides, mesh.vertices().len());
+        Self { triangles, sides, vertices: mesh.vertices().len(), copies: OnceLock::new(), pinched: OnceLock::new() }
     }
 
     /// The sides that lie on one edge, edge by edge, in the order of their ends.
@@ -70,7 +74,11 @@ impl Topology {
     }
 
     /// By vertex: whether triangles meet there that are not joined by edges around it.
-    pub fn pinched(&self) -> Vec<bool> {
+    pub fn pinched(&self) -> &[bool] {
+        self.pinched.get_or_init(|| self.find_pinched())
+    }
+
+    fn find_pinched(&self) -> Vec<bool> {
         // Corners joined across edges make fans; a vertex with two fans is pinched.
         let mut corners = Sets::new(3 * self.triangles.len());
         for sides in self.edges() {
@@ -94,28 +102,44 @@ impl Topology {
     }
 
     /// Groups of two or more triangles over the same corners.
-    pub fn copies(&self) -> Vec<Copies> {
-        let mut keys: Vec<([u32; 3], u32)> =
-            (0..self.triangles.len() as u32).filter(|&t| !collapsed(&self.triangles[t as usize])).map(|t| (self.sorted(t), t)).collect();
-        keys.sort_unstable();
-        let mut groups = Vec::new();
-        for group in keys.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
-            let mut copies = Copies::default();
-            for &(sorted, triangle) in group {
-                let [a, b, c] = self.triangles[triangle as usize];
-                let even = [[a, b, c], [b, c, a], [c, a, b]].contains(&sorted);
-                if even { copies.even.push(triangle) } else { copies.odd.push(triangle) }
+    pub fn copies(&self) -> &[Copies] {
+        self.copies.get_or_init(|| {
+            let mut groups = Vec::new();
+            // A triangle is found at the edge of its two lowest corners.
+            for sides in self.edges().filter(|sides| sides.len() > 1) {
+                let third = |side: &TriangleSide| self.triangles[side.triangle as usize][(usize::from(side.side) + 2) % 3];
+                let mut here: Vec<&TriangleSide> = sides.iter().filter(|side| third(side) > side.ends[1]).collect();
+                here.sort_by_key(|side| third(side));
+                for group in here.chunk_by(|a, b| third(a) == third(b)).filter(|group| group.len() > 1) {
+                    let turning = |forward| group.iter().filter(|side| side.forward == forward).map(|side| side.triangle).collect();
+                    groups.push(Copies { even: turning(true), odd: turning(false) });
+                }
             }
-            groups.push(copies);
-        }
-        groups
+            groups
+        })
     }
+}
 
-    fn sorted(&self, triangle: u32) -> [u32; 3] {
-        let mut t = self.triangles[triangle as usize];
-        t.sort_unstable();
-        t
+/// Sorts sides, given by ascending triangle, by edge: first by the lower end, which puts few in one place.
+fn by_edge(sides: &[TriangleSide], vertices: usize) -> Vec<TriangleSide> {
+    let mut first = vec![0u32; vertices + 1];
+    for side in sides {
+        first[side.ends[0] as usize + 1] += 1;
     }
+    for v in 0..vertices {
+        first[v + 1] += first[v];
+    }
+    let mut next = first.clone();
+    let mut sorted = sides.to_vec();
+    for side in sides {
+        let at = &mut next[side.ends[0] as usize];
+        sorted[*at as usize] = *side;
+        *at += 1;
+    }
+    for place in first.windows(2) {
+        sorted[place[0] as usize..place[1] as usize].sort_unstable_by_key(|side| (side.ends[1], side.triangle));
+    }
+    sorted
 }
 
 /// Whether two corners coincide: the triangle is a segment or a point.

@@ -179,7 +179,7 @@ impl Check {
             position[v as usize] = true;
         }
         self.positions = position.iter().filter(|&&there| there).count();
-        for (v, _) in topology.pinched().into_iter().enumerate().filter(|(_, pinched)| *pinched) {
+        for (v, _) in topology.pinched().iter().enumerate().filter(|(_, pinched)| **pinched) {
             self.pinched_vertices.add(v as u32);
         }
     }

@@ -81,7 +81,7 @@ impl Pseudonormals {
                 corners[corner as usize].error = f64::INFINITY;
             }
             for (corner, pinched) in corners.iter_mut().zip(topology.pinched()) {
-                if pinched {
+                if *pinched {
                     corner.error = f64::INFINITY;
                 }
             }

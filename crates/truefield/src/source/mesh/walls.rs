@@ -107,10 +107,13 @@ pub(crate) fn walls(
         let start = block * CHUNK;
         let each = chunk(block).iter().zip(&groups_at[start..]).map(|(group, at)| {
             let mut steps = Steps::new(at, boundary);
-            group
-                .iter()
-                .map(|&t| known[t as usize].map_or(Wall::UNKNOWN, |known| steps.wall(&spots[t as usize], known)))
-                .collect::<Vec<_>>()
+            let mut wall = |t: u32| {
+                let (spot, known) = (&spots[t as usize], known[t as usize]?);
+                let wall = steps.wall(spot, known);
+                let near = f64::from(wall.reach) < 4.0 * at.radius;
+                Some(if near { Steps::new(spot, boundary).wall(spot, known) } else { wall })
+            };
+            group.iter().map(|&t| wall(t).unwrap_or(Wall::UNKNOWN)).collect::<Vec<_>>()
         });
         Ok(each.collect::<Vec<_>>())
     })?;
