@@ -217,11 +217,9 @@ impl<'a> Part<'a> {
 fn partition(items: &mut [Item], left: impl Fn(&Item) -> bool) -> usize {
     let mut at = 0;
     for index in 0..items.len() {
-        let item = items[index];
-        // Both writes are always made: no branch to be guessed.
-        items[index] = items[at];
-        items[at] = item;
-        at += usize::from(left(&item));
+        // Always swapped: no branch to be guessed.
+        items.swap(index, at);
+        at += usize::from(left(&items[at]));
     }
     at
 }
