@@ -47,7 +47,9 @@ pub fn sample(surface: &Surface, lattice: &Grid, band: Option<f64>, memory: u64,
         let mut descent = Descent::new(surface.tree(), &scaled, Span::Points);
         // Sides of far tiles of an open mesh may differ from sample to sample: they need their lists.
         let upper = if surface.side_changes_at_surface_only() { band * scale } else { f64::INFINITY };
-        descent.tile(tile, TILE, Range { lower: 0.0, upper }, &mut |visit| {
+        // Little of the lattice is in a band: single queries find it quicker than lists.
+        let fine = if band.is_finite() { EDGE } else { TILE };
+        descent.survey(tile, TILE, fine, Range { lower: 0.0, upper }, &mut |visit| {
             run.cancel.check()?;
             Ok(sampler.visit(visit))
         })?;

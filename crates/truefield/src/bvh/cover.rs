@@ -47,17 +47,19 @@ pub(crate) struct Scratch {
     stack: Vec<u32>,
 }
 
-/// The triangle nearest to the centre of `cell`, and the range that follows for all of it.
-pub(crate) fn center_range(tree: &Tree, cell: &Aabb) -> (Candidate, Range) {
-    let nearest = tree.nearest(cell.center(), Candidate::within(f64::INFINITY));
+/// The triangle nearest to the centre of `cell`, and the range that follows for all of it; `near` is a triangle that may be near.
+pub(crate) fn center_range(tree: &Tree, cell: &Aabb, near: Slot) -> (Candidate, Range) {
+    let center = cell.center();
+    let start = Candidate { distance_squared: tree.facet_at(near).distance_squared(center), triangle: tree.triangle(near) };
+    let nearest = tree.nearest(center, start);
     let (distance, radius) = (nearest.distance_squared.sqrt(), cell.radius() * (1.0 + 1e-12));
     (nearest, Range { lower: (distance - radius).max(0.0), upper: distance + radius })
 }
 
 /// Fills `out` with every triangle that can be nearest somewhere in `cell`, ascending, if distances in
 /// `window` can occur there.
-pub(crate) fn gather(tree: &Tree, cell: &Aabb, window: Range, scratch: &mut Scratch, out: &mut Vec<Slot>) -> Range {
-    let (first, range) = center_range(tree, cell);
+pub(crate) fn gather(tree: &Tree, cell: &Aabb, near: Slot, window: Range, scratch: &mut Scratch, out: &mut Vec<Slot>) -> Range {
+    let (first, range) = center_range(tree, cell, near);
     out.clear();
     if range.meets(window) {
         let witness = tree.facet(first.triangle).nearest(cell.center()).point;

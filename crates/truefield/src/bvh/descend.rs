@@ -114,11 +114,13 @@ pub(crate) struct Descent<'a> {
     scratch: Scratch,
     /// Lists that no block uses at present.
     lists: Vec<[Vec<Slot>; OCTANTS]>,
+    /// The triangle found last; it may be near the next block too.
+    near: Slot,
 }
 
 impl<'a> Descent<'a> {
     pub fn new(tree: &'a Tree, lattice: &'a Grid, span: Span) -> Self {
-        Self { tree, lattice, span, scratch: Scratch::default(), lists: Vec::new() }
+        Self { tree, lattice, span, scratch: Scratch::default(), lists: Vec::new(), near: Slot(0) }
     }
 
     /// Visits `tile`, whose edge is at most `edge` (a power of two), and its parts.
@@ -127,7 +129,7 @@ impl<'a> Descent<'a> {
     pub fn tile(&mut self, tile: Block, edge: i64, window: Range, visit: &mut impl FnMut(Visit<'_>) -> Result<Step>) -> Result<()> {
         let cell = tile.extent(self.lattice, self.span);
         let mut list = Vec::new();
-        let range = gather(self.tree, &cell, window, &mut self.scratch, &mut list);
+        let range = gather(self.tree, &cell, self.near, window, &mut self.scratch, &mut list);
         self.block(Visit { block: tile, cell, range, list: &list }, edge, visit)
     }
 
@@ -146,7 +148,8 @@ impl<'a> Descent<'a> {
             return self.tile(tile, edge, window, visit);
         }
         let cell = tile.extent(self.lattice, self.span);
-        let (_, range) = center_range(self.tree, &cell);
+        let (found, range) = center_range(self.tree, &cell, self.near);
+        self.near = self.tree.slots[found.triangle as usize];
         if !range.meets(window) || visit(Visit { block: tile, cell, range, list: &[] })? == Step::Done {
             return Ok(());
         }

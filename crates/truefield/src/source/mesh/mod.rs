@@ -4,6 +4,7 @@ mod check;
 mod layers;
 mod pseudonormal;
 mod sign;
+mod sum;
 mod walls;
 
 use std::sync::Arc;

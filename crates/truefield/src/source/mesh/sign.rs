@@ -1,11 +1,10 @@
 //! Which side of a mesh a point is on.
 
 use crate::bvh::Tree;
-use crate::bvh::boundary::Boundary;
 use crate::bvh::intersect::Meetings;
-use crate::bvh::winding::{Estimate, Winding};
+use crate::bvh::winding::Winding;
 use crate::error::Result;
-use crate::geom::{Aabb, DVec3, FacetPoint};
+use crate::geom::{DVec3, FacetPoint};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
@@ -13,6 +12,7 @@ use crate::run::Run;
 use super::check::Check;
 use super::layers::Layers;
 use super::pseudonormal::{Proof, Pseudonormals};
+use super::sum::Sum;
 use super::walls::{Wall, walls};
 
 /// How the user wants sides to be decided.
@@ -69,7 +69,7 @@ impl Side {
     }
 
     /// The guess, taken for decided.
-    fn certain(self) -> Self {
+    pub(super) fn certain(self) -> Self {
         if self.sign() < 0.0 { Self::Inside } else { Self::Outside }
     }
 
@@ -115,14 +115,6 @@ enum Walls {
     Known(Vec<Wall>),
 }
 
-/// Winding numbers and what is known about the chain of edges that bounds the surface.
-#[derive(Clone, Debug)]
-struct Sum {
-    winding: Winding,
-    boundary: Boundary,
-    extent: Aabb,
-}
-
 impl Signs {
     /// Finds the rule and prepares it. O(n log n).
     pub fn new(mesh: &TriangleMesh, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
@@ -139,10 +131,8 @@ impl Signs {
             topology = Topology::new(mesh);
         }
         let layers = Layers::new(mesh, &topology);
-        let winding = Winding::build(&layers.corners(mesh), run)?;
-        let boundary = Boundary::new(mesh, &layers.boundary);
-        let closed = boundary.is_empty();
-        let sum = Sum { winding, boundary, extent: mesh.extent() };
+        let sum = Sum::new(mesh, &layers, run)?;
+        let closed = sum.boundary.is_empty();
         let (fault, meetings) = look(mesh, &topology, tree, &sum.winding, moved, run)?;
         let rule = rule(choice, fault.as_deref(), joined.as_ref(), closed);
         let (normals, walls) = if fault.is_some() && rule.kind == SignKind::Pseudonormal {
@@ -196,8 +186,8 @@ impl Signs {
         match &self.decided {
             Some(decided) if !self.parted && !matches!(decided.walls, Walls::Trusted) && !self.blurred(nearest) => {
                 match decided.near(mesh, p, nearest, triangle) {
-                    Some((side, carry)) if carry >= WORTH * radius => (side, carry),
-                    _ => decided.sum.steady(p, radius),
+                    Some(known) => known,
+                    None => decided.sum.steady(p, radius),
                 }
             }
             _ => {
@@ -277,51 +267,6 @@ impl Decided {
     }
 }
 
-impl Sum {
-    fn side(&self, p: DVec3) -> Side {
-        if self.boundary.is_empty() {
-            // Whole numbers: 0 outside the box, and an error below 1 decides.
-            if !self.extent.contains(p) {
-                return Side::Outside;
-            }
-            let whole = |e: Estimate| (e.value.abs() > e.error, e.value.abs() + e.error < 1.0);
-            let e = self.winding.refine(p, |e| matches!(whole(e), (true, _) | (_, true)) || hopeless(e));
-            return match whole(e) {
-                (true, _) => Side::Inside,
-                (_, true) => Side::Outside,
-                _ => guess(e),
-            };
-        }
-        let e = self.winding.refine(p, |e| (e.value.abs() - 0.5).abs() > e.error || hopeless(e));
-        if (e.value.abs() - 0.5).abs() > e.error { guess(e).certain() } else { guess(e) }
-    }
-
-    /// See [`Signs::steady`].
-    fn steady(&self, p: DVec3, radius: f64) -> (Side, f64) {
-        let margin = |e: Estimate| (e.value.abs() - 0.5).abs();
-        let e = self.winding.refine(p, |e| margin(e) > 1.3 * e.error || hopeless(e));
-        let left = margin(e) - e.error;
-        if left <= 0.0 {
-            return (self.side(p), 0.0);
-        }
-        (guess(e).certain(), (left / self.boundary.steepest(p, radius)).min(radius))
-    }
-
-    /// See [`Signs::side_of_ball`].
-    fn side_of_ball(&self, p: DVec3, radius: f64) -> Option<Side> {
-        let change = self.boundary.steepest(p, radius) * radius;
-        if change >= 0.5 {
-            return None;
-        }
-        let decided = |e: Estimate| (e.value.abs() - 0.5).abs() > e.error + change;
-        let e = self.winding.refine(p, |e| decided(e) || e.error < 0.25 * change || hopeless(e));
-        decided(e).then(|| guess(e).certain())
-    }
-}
-
-/// A side that carries less than this part of what is asked for is asked of the winding number.
-const WORTH: f64 = 0.25;
-
 /// Vertices so many ulp of the largest coordinate apart are taken for one: what exporters leave behind.
 const NOISE: f64 = 8.0 * f64::EPSILON;
 
@@ -363,15 +308,6 @@ fn join_vertices(mesh: &TriangleMesh) -> Result<Option<Joined>> {
     let triangles = mesh.triangles().iter().map(|t| t.map(|v| partner[v as usize])).collect();
     // Where joining leaves nothing of the surface the mesh is taken as it is.
     Ok(TriangleMesh::new(vertices.to_vec(), triangles).ok().map(|mesh| Joined { mesh, within }))
-}
-
-/// Whether the surface passes within rounding of the point and everything else is known well enough to guess.
-fn hopeless(e: Estimate) -> bool {
-    e.doubt > 0.0 && e.error - e.doubt < 0.125
-}
-
-fn guess(e: Estimate) -> Side {
-    if e.value.abs() > 0.5 { Side::PerhapsInside } else { Side::PerhapsOutside }
 }
 
 #[cfg(test)]

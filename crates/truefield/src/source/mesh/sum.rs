@@ -1,0 +1,132 @@
+//! Sides by winding numbers: what is left where no triangle can tell.
+
+use crate::bvh::boundary::Boundary;
+use crate::bvh::winding::{Estimate, Winding};
+use crate::error::Result;
+use crate::geom::{Aabb, DVec3};
+use crate::mesh::TriangleMesh;
+use crate::mesh::topology::Sets;
+use crate::run::Run;
+
+use super::layers::Layers;
+use super::sign::Side;
+
+/// Boundaries with more edges than this part of the triangles are not capped: the cap would be another mesh.
+const CAPPED: usize = 4;
+
+/// Winding numbers and what is known about the chain of edges that bounds the surface.
+///
+/// Cones over that chain, the *cap*, close the surface, so that the winding numbers of both are a whole number together: a
+/// rough sum over the surface and a good one over the small cap tell the winding number of the surface well.
+#[derive(Clone, Debug)]
+pub(crate) struct Sum {
+    pub winding: Winding,
+    pub boundary: Boundary,
+    cap: Option<Winding>,
+    extent: Aabb,
+}
+
+impl Sum {
+    pub fn new(mesh: &TriangleMesh, layers: &Layers, run: &Run<'_>) -> Result<Self> {
+        let winding = Winding::build(&layers.corners(mesh), run)?;
+        let small = CAPPED * layers.boundary.len() <= layers.triangles.len();
+        let cap = if small && !layers.boundary.is_empty() { Some(Winding::build(&cap(mesh, &layers.boundary), run)?) } else { None };
+        Ok(Self { winding, boundary: Boundary::new(mesh, &layers.boundary), cap, extent: mesh.extent() })
+    }
+
+    pub fn side(&self, p: DVec3) -> Side {
+        if self.boundary.is_empty() {
+            // Whole numbers: 0 outside the box, and an error below 1 decides.
+            if !self.extent.contains(p) {
+                return Side::Outside;
+            }
+            let whole = |e: Estimate| (e.value.abs() > e.error, e.value.abs() + e.error < 1.0);
+            let e = self.winding.refine(p, |e| matches!(whole(e), (true, _) | (_, true)) || hopeless(e));
+            return match whole(e) {
+                (true, _) => Side::Inside,
+                (_, true) => Side::Outside,
+                _ => guess(e),
+            };
+        }
+        let e = self.number(p, |e| margin(e) > e.error);
+        if margin(e) > e.error { guess(e).certain() } else { guess(e) }
+    }
+
+    /// The side of `p`, and the length of the paths from it that stay on that side as long as they stay off the
+    /// surface; paths longer than `radius` are not asked for.
+    pub fn steady(&self, p: DVec3, radius: f64) -> (Side, f64) {
+        let e = self.number(p, |e| margin(e) > 2.0 * e.error);
+        let left = margin(e) - e.error;
+        if left <= 0.0 {
+            return (self.side(p), 0.0);
+        }
+        // In a ball that reaches the boundary there is no bound.
+        let radius = radius.min(0.5 * self.boundary.gap(p));
+        (guess(e).certain(), (left / self.boundary.steepest(p, radius)).min(radius))
+    }
+
+    /// The side of every point of the ball around `p`, which does not touch the surface, if they all have one.
+    pub fn side_of_ball(&self, p: DVec3, radius: f64) -> Option<Side> {
+        let change = self.boundary.steepest(p, radius) * radius;
+        if change >= 0.5 {
+            return None;
+        }
+        let decided = |e: Estimate| margin(e) > e.error + change;
+        let e = self.number(p, |e| decided(e) || e.error < 0.25 * change);
+        decided(e).then(|| guess(e).certain())
+    }
+
+    /// The winding number around `p`, until `enough` or until rounding is all that is left.
+    fn number(&self, p: DVec3, enough: impl Fn(Estimate) -> bool) -> Estimate {
+        if let Some(cap) = &self.cap {
+            let rough = self.winding.refine(p, |e| enough(e) || e.error < 0.25 || hopeless(e));
+            if enough(rough) {
+                return rough;
+            }
+            // The whole number less the share of the cap.
+            let known = |c: Estimate| Estimate { value: (rough.value + c.value).round() - c.value, ..c };
+            let sure = |c: Estimate| rough.error + c.error < 0.499;
+            let c = cap.refine(p, |c| sure(c) && enough(known(c)) || hopeless(c));
+            if sure(c) && enough(known(c)) {
+                return known(c);
+            }
+        }
+        self.winding.refine(p, |e| enough(e) || hopeless(e))
+    }
+}
+
+/// Cones over the boundary, one for each piece that hangs together: with them the surface is closed.
+fn cap(mesh: &TriangleMesh, boundary: &[([u32; 2], u32)]) -> Vec<[DVec3; 3]> {
+    let mut pieces = Sets::new(mesh.vertices().len());
+    for &([a, b], _) in boundary {
+        pieces.join(a, b);
+    }
+    let mut tops = std::collections::HashMap::new();
+    for &([a, b], _) in boundary {
+        let top: &mut (DVec3, f64) = tops.entry(pieces.find(a)).or_default();
+        top.0 += mesh.vertices()[a as usize] + mesh.vertices()[b as usize];
+        top.1 += 2.0;
+    }
+    let mut cones = Vec::new();
+    for &([a, b], times) in boundary {
+        let (sum, count) = tops[&pieces.find(a)];
+        let [from, to] = [a, b].map(|v| mesh.vertices()[v as usize]);
+        // Against the edge, so that it cancels.
+        cones.extend(std::iter::repeat_n([sum / count, to, from], times as usize));
+    }
+    cones
+}
+
+/// How far a winding number is from the half that parts inside from outside.
+fn margin(e: Estimate) -> f64 {
+    (e.value.abs() - 0.5).abs()
+}
+
+/// Whether the surface passes within rounding of the point and everything else is known well enough to guess.
+fn hopeless(e: Estimate) -> bool {
+    e.doubt > 0.0 && e.error - e.doubt < 0.125
+}
+
+fn guess(e: Estimate) -> Side {
+    if e.value.abs() > 0.5 { Side::PerhapsInside } else { Side::PerhapsOutside }
+}
