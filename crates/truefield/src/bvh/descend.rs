@@ -144,7 +144,8 @@ impl<'a> Descent<'a> {
         window: Range,
         visit: &mut impl FnMut(Visit<'_>) -> Result<Step>,
     ) -> Result<()> {
-        if edge <= fine {
+        // Where the lattice ends blocks may be smaller than their edge.
+        if tile.edge() <= fine {
             return self.tile(tile, edge, window, visit);
         }
         let cell = tile.extent(self.lattice, self.span);
