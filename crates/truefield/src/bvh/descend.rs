@@ -133,9 +133,9 @@ impl<'a> Descent<'a> {
         self.block(Visit { block: tile, cell, range, list: &list }, edge, visit)
     }
 
-    /// Visits the parts of `tile`, of edge at most `edge`, where distances in `window` can occur.
+    /// As [`Self::tile`]; blocks above the edge `fine` are shown without lists, and divided where distances in `window` can occur.
     ///
-    /// Down to blocks of edge `fine` single queries tell where those are: quicker than lists while little is wanted.
+    /// Down to blocks of that edge single queries tell where those are: quicker than lists while little is wanted.
     pub fn survey(
         &mut self,
         tile: Block,
@@ -151,7 +151,7 @@ impl<'a> Descent<'a> {
         let cell = tile.extent(self.lattice, self.span);
         let (found, range) = center_range(self.tree, &cell, self.near);
         self.near = self.tree.slots[found.triangle as usize];
-        if !range.meets(window) || visit(Visit { block: tile, cell, range, list: &[] })? == Step::Done {
+        if visit(Visit { block: tile, cell, range, list: &[] })? == Step::Done || !range.meets(window) {
             return Ok(());
         }
         for half in tile.halves(edge / 2) {
