@@ -283,7 +283,7 @@ class SampledField:
         a sample while it runs, 12 then.
 
         Raises:
-            TruefieldError: the field is of a mesh with openings, or the distance is not finite.
+            TruefieldError: the field is of a mesh with openings or of no distances, or `distance` is not finite.
             MemoryError: the samples do not fit into `memory` bytes, half the machine's memory by default.
         """
         length = arguments.number("distance", distance)

@@ -159,6 +159,17 @@ fn infinite_samples_do_not_spoil_their_neighbours() {
     assert_eq!(field.interpolate(DVec3::X), Some(2.0));
     assert_eq!(field.interpolate(DVec3::X * 1.5), Some(f64::INFINITY));
     assert_eq!(field.gradient(DVec3::X * 0.5), Some(DVec3::X));
+    for error in [0.0, 0.5, f64::INFINITY] {
+        let field = SampledField::new(lattice, vec![f32::NEG_INFINITY, 1.0, f32::INFINITY], Known::Within(error), Continuity::Everywhere);
+        let field = field.expect("a field");
+        assert!((0..3).all(|n| field.interval(n).contains(f64::from(field.values()[n]))), "error {error}");
+        match offset(&field, 0.25, PLENTY, &Run::default()) {
+            Ok(grown) => assert_eq!((error, grown.values()), (f64::INFINITY, [f32::NEG_INFINITY, 0.75, f32::INFINITY].as_slice())),
+            // No distance is infinite beside a finite one.
+            Err(Error::Invalid(sentence)) => assert!(error < 1.0 && sentence.contains("no distances"), "{sentence}"),
+            Err(other) => panic!("{other}"),
+        }
+    }
 }
 
 #[test]

@@ -147,6 +147,8 @@ impl SampledField {
             }
             Known::Rounded { .. } => Interval { lower: f64::from(value.next_down()), upper: f64::from(value.next_up()) },
             Known::Within(error) if *error == 0.0 => Interval::exact(f64::from(value)),
+            // Of an infinite value too nothing is known then.
+            Known::Within(error) if error.is_infinite() => Interval { lower: f64::NEG_INFINITY, upper: f64::INFINITY },
             Known::Within(error) => Interval { lower: (f64::from(value) - error).next_down(), upper: (f64::from(value) + error).next_up() },
             Known::Between { lower, upper } => Interval { lower: f64::from(lower[number]), upper: f64::from(upper[number]) },
         }

@@ -71,6 +71,11 @@ pub(super) fn build(
     })?;
     let mut lower: Vec<f32> = rows.iter().map(|row| row[0]).collect();
     tighten(&lattice, &mut lower, run)?;
+    if rows.iter().zip(&lower).any(|(row, lower)| *lower > row[2]) {
+        return Err(Error::invalid(
+            "samples of the field differ by more than the way between them, so they are no distances; state a larger error",
+        ));
+    }
     let value = |(row, lower): (&[f32; 3], &f32)| row[1].max(*lower).min(row[2]);
     let mut values: Vec<f32> = rows.iter().zip(&lower).map(value).collect();
     let mut upper: Vec<f32> = rows.into_iter().map(|row| row[2]).collect();
