@@ -233,8 +233,8 @@ def distance_transform(
     result and some MiB for each thread; 4 bytes a voxel more for indices (8 from 2^31 voxels on), 8 for bounds, and 8
     while it runs where the sampling has no whole ratios (1 : pi) or squares do not fit.
 
-    On two threads, 512^3 voxels take 4 to 7 nanoseconds of processor time each, twice that with indices or signs, three
-    times with bounds; along axes at any angles 200 to 3000.
+    On two threads, 512^3 voxels take 4 to 7 nanoseconds of processor time each, twice that with indices or signs; at
+    256^3, four times that with bounds, and where the sampling has no whole ratios; 200 to 3000 along axes at any angles.
 
     Bounds hold whatever rule made voxels of the surface. Unsigned: for every surface that stays within the voxels of
     the background and meets each of them that has a neighbour in the foreground. Signed or with labels: for every
