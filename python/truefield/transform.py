@@ -246,7 +246,7 @@ def distance_transform(
     A wavefront finds the same distances: its passes are in step, which makes it exact, and there are fewer of them than
     voxels along the longest axis. In the order of distance some voxels keep a site slightly farther than the nearest;
     `DistanceTransform.farther_than` counts them. Both take 1 to 3 axes, from centre to centre, none periodic, and
-    nothing beyond the border. A wavefront takes 18 to 22 bytes a voxel and 16 to 24 for each that a pass changes; a
+    nothing beyond the border. A wavefront takes 18 to 22 bytes a voxel and 12 to 16 for each that a pass changes; a
     march, on one thread, takes 16 and 16 for each trial. They give a `DistanceTransform`.
 
     Saito and Toriwaki 1994 and Felzenszwalb and Huttenlocher 2012 show that squared distances are separable.

@@ -50,7 +50,7 @@ pub struct Wavefront {
 ///
 /// Takes 1 to 3 axes of at most 32,767 voxels; `sampling` is the distance of neighbouring voxels along each. Where
 /// several neighbours offer sites that are equally near, the first in the order of indices passes its own on. Takes 18
-/// to 22 bytes a voxel and 16 to 24 for every voxel that a pass changes; refuses more than `memory` bytes.
+/// to 22 bytes a voxel and 12 to 16 for every voxel that a pass changes; refuses more than `memory` bytes.
 pub fn wavefront(shape: &[usize], sampling: &[f64], sites: &[bool], limit: f64, memory: u64, run: &Run<'_>) -> Result<Wavefront> {
     let raster = Raster::new(shape, sampling)?;
     raster.check_marks(sites)?;
@@ -87,7 +87,7 @@ struct Agenda {
 fn go<M: Ringed>(layout: Layout, metric: M, sites: &[bool], run: &Run<'_>) -> Result<Wavefront> {
     let (quiet, progress) = (Run { progress: &Silent, ..*run }, run.progress);
     let mut planes = Planes::new(layout, metric, sites, &quiet)?;
-    let slabs = layout.slabs();
+    let (slabs, directions) = (layout.slabs(), directions());
     let mut agendas: Vec<Mutex<Agenda>> = Vec::new();
     agendas.resize_with(slabs, Mutex::default);
     let mut found: Vec<Found<M::Key>> = quiet.blocks("wavefront", slabs, |slab| Ok(seeds(&planes, slab)))?;
@@ -99,7 +99,7 @@ fn go<M: Ringed>(layout: Layout, metric: M, sites: &[bool], run: &Run<'_>) -> Re
         let parts: Vec<Mutex<Part<'_, M>>> = planes.parts().into_iter().map(Mutex::new).collect();
         run.blocks("wavefront", slabs, |slab| {
             apply(&layout, slab, &found, &mut parts[slab].lock().unwrap_or_else(PoisonError::into_inner));
-            plan(&layout, slab, &found, &mut agendas[slab].lock().unwrap_or_else(PoisonError::into_inner));
+            plan(&layout, &directions, slab, &found, &mut agendas[slab].lock().unwrap_or_else(PoisonError::into_inner));
             Ok(())
         })?;
         drop(parts);
@@ -133,7 +133,7 @@ fn seeds<M: Metric>(planes: &Planes<M>, slab: usize) -> Found<M::Key> {
             let keys = planes.key[at..at + LANES].iter().enumerate();
             let voxels = keys.fold(0, |bits, (lane, key)| bits | u16::from(*key == M::SITE) << lane);
             if voxels != 0 {
-                found.segments.push(Changed { row: row as u32, segment: segment as u32, voxels, ahead: u8::MAX });
+                found.segments.push(Changed { row: row as u32, segment: segment as u32, voxels, ahead: 63 });
             }
         }
     }
@@ -143,17 +143,51 @@ fn seeds<M: Metric>(planes: &Planes<M>, slab: usize) -> Found<M::Key> {
 /// Gives the voxels of a slab the state that was found for them.
 fn apply<M: Metric>(layout: &Layout, slab: usize, found: &[Found<M::Key>], part: &mut Part<'_, M>) {
     let start = layout.inner().start + slab * layout.slab_length();
-    for change in &found[slab].voxels {
-        let at = change.at as usize - start;
-        part.key[at] = change.key;
-        for axis in 0..3 {
-            part.offset[axis][at] = change.offset[axis];
+    let mut changes = found[slab].voxels.iter();
+    // Seeds are segments without changes.
+    for changed in &found[slab].segments {
+        let at = layout.start(changed.row as usize) + changed.segment as usize * LANES - start;
+        let keys = part.key[at..].first_chunk_mut::<LANES>();
+        let offsets = part.offset.each_mut().map(|offset| offset[at..].first_chunk_mut::<LANES>());
+        let (Some(keys), [Some(x), Some(y), Some(z)]) = (keys, offsets) else { return };
+        let mut rest = changed.voxels;
+        while rest != 0 {
+            let Some(change) = changes.next() else { return };
+            let lane = rest.trailing_zeros() as usize % LANES;
+            rest &= rest - 1;
+            keys[lane] = change.key;
+            [x[lane], y[lane], z[lane]] = change.offset;
         }
     }
 }
 
+/// A row that a change is ahead of.
+#[derive(Clone, Copy, Debug, Default)]
+struct Toward {
+    x: isize,
+    y: isize,
+    /// For neighbours before, beside and after a voxel of it, which the front reaches upward, straight and downward.
+    bits: u32,
+    /// Where these bits stand among its neighbours: seen from there, the change is in the row the other way.
+    shift: u32,
+}
+
+/// The rows ahead of a change, for each set of directions.
+fn directions() -> Vec<Vec<Toward>> {
+    let rows = |ahead: u8| {
+        let meets = move |axis: usize, step: isize| step != 0 && ahead >> (2 * axis + usize::from(step < 0)) & 1 != 0;
+        let toward = move |n: isize| {
+            let (x, y) = (n / 3 - 1, n % 3 - 1);
+            let bits = if meets(0, x) || meets(1, y) { 7 } else { u32::from(meets(2, 1)) | u32::from(meets(2, -1)) << 2 };
+            Toward { x, y, bits, shift: 3 * (8 - n) as u32 }
+        };
+        (0..9).map(toward).filter(|toward| toward.bits != 0).collect()
+    };
+    (0..64).map(rows).collect()
+}
+
 /// Which segments of a slab have to look at which neighbours, after what changed in it and beside it.
-fn plan<K>(layout: &Layout, slab: usize, found: &[Found<K>], agenda: &mut Agenda) {
+fn plan<K>(layout: &Layout, directions: &[Vec<Toward>], slab: usize, found: &[Found<K>], agenda: &mut Agenda) {
     let (rows, around, segments) = (layout.rows(slab), layout.rows_around(slab), layout.segments());
     let Agenda { wanted, looks } = agenda;
     wanted.resize(rows.len() * segments, 0);
@@ -161,26 +195,24 @@ fn plan<K>(layout: &Layout, slab: usize, found: &[Found<K>], agenda: &mut Agenda
     let beside = &found[slab.saturating_sub(1)..(slab + 2).min(found.len())];
     for changed in beside.iter().flat_map(|found| &found.segments).filter(|changed| around.contains(&(changed.row as usize))) {
         let (place, segment) = (layout.place(changed.row as usize), changed.segment as usize);
-        let ahead = |axis: usize, step: isize| step != 0 && changed.ahead >> (2 * axis + usize::from(step < 0)) & 1 != 0;
-        for (x, y) in (0..9).map(|n| (n / 3 - 1, n % 3 - 1)) {
-            // Bits for the neighbours before, beside and after a voxel: they step ahead upward, not at all and downward.
-            let bits = if ahead(0, x) || ahead(1, y) { 7 } else { u32::from(ahead(2, 1)) | u32::from(ahead(2, -1)) << 2 };
-            let Some(row) = layout.row(place, x, y).filter(|row| bits != 0 && rows.contains(row)) else { continue };
-            // Seen from there, the change is in the row the other way.
-            let shift = 3 * (4 - 3 * x - y);
+        let before = changed.voxels & 1 != 0 && segment > 0;
+        let after = changed.voxels >> (LANES - 1) != 0 && segment + 1 < segments;
+        for toward in &directions[usize::from(changed.ahead)] {
+            let Some(row) = layout.row(place, toward.x, toward.y).filter(|row| rows.contains(row)) else { continue };
+            let start = (row - rows.start) * segments;
             let mut mark = |segment: usize, bits: u32| {
-                let wanted = &mut wanted[(row - rows.start) * segments + segment];
+                let wanted = &mut wanted[start + segment];
                 if *wanted == 0 && bits != 0 {
                     looks.push(Look { row: row as u32, segment: segment as u32, neighbours: 0 });
                 }
-                *wanted |= bits << shift;
+                *wanted |= bits << toward.shift;
             };
-            mark(segment, bits);
-            if changed.voxels & 1 != 0 && segment > 0 {
-                mark(segment - 1, bits & 4);
+            mark(segment, toward.bits);
+            if before {
+                mark(segment - 1, toward.bits & 4);
             }
-            if changed.voxels >> (LANES - 1) != 0 && segment + 1 < segments {
-                mark(segment + 1, bits & 1);
+            if after {
+                mark(segment + 1, toward.bits & 1);
             }
         }
     }

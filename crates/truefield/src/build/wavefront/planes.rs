@@ -1,6 +1,6 @@
 //! The state of a wavefront: for every voxel how far its site is and where.
 
-use super::metric::Metric;
+use super::metric::{Metric, code, delta};
 use crate::build::raster::Raster;
 use crate::error::Result;
 use crate::run::Run;
@@ -21,6 +21,8 @@ pub(super) struct Layout {
     padded: [usize; 3],
     /// The axis that is cut into slabs.
     slow: usize,
+    /// The step to each neighbour by its number, and what it adds to an index, modulo the range of `usize`.
+    pub moves: [([i16; 3], usize); 28],
 }
 
 impl Layout {
@@ -28,7 +30,12 @@ impl Layout {
         let shape = raster.shape;
         let pad = [usize::from(shape[0] > 1), usize::from(shape[1] > 1)];
         let padded = [shape[0] + 2 * pad[0], shape[1] + 2 * pad[1], shape[2].div_ceil(LANES) * LANES + 2];
-        Self { shape, pad, padded, slow: usize::from(shape[0] == 1) }
+        let moves = std::array::from_fn(|code| {
+            let step = delta(code);
+            let [x, y, z] = step.map(isize::from);
+            (step, ((x * padded[1] as isize + y) * padded[2] as isize + z) as usize)
+        });
+        Self { shape, pad, padded, slow: usize::from(shape[0] == 1), moves }
     }
 
     /// Padded length.
@@ -86,9 +93,10 @@ impl Layout {
         ((i + self.pad[0]) * self.padded[1] + j + self.pad[1]) * self.padded[2] + 1
     }
 
-    /// What leads to the row `(x, y)` away, modulo the range of `usize`.
-    pub fn jump(&self, x: isize, y: isize) -> usize {
-        (x * (self.padded[1] * self.padded[2]) as isize + y * self.padded[2] as isize) as usize
+    /// What leads to the row `(X, Y)` away, modulo the range of `usize`.
+    #[inline(always)]
+    pub fn jump<const X: i16, const Y: i16>(&self) -> usize {
+        self.moves[code(X, Y, 0) as usize].1
     }
 
     /// Where a row of the volume is along x and y.

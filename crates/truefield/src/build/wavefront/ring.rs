@@ -1,6 +1,6 @@
 //! One ring: segments of 16 voxels look at their neighbours, a vector at a time.
 
-use super::metric::{Metric, Scaled, Whole, code, delta};
+use super::metric::{Metric, Scaled, Whole, code};
 use super::planes::{LANES, Planes};
 use crate::simd::{Fuse, multiversion};
 
@@ -26,7 +26,6 @@ pub(super) struct Changed {
 /// A voxel's new state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Change<K> {
-    pub at: u32,
     pub key: K,
     pub offset: [i16; 3],
 }
@@ -35,6 +34,7 @@ pub(super) struct Change<K> {
 #[derive(Debug)]
 pub(super) struct Found<K> {
     pub segments: Vec<Changed>,
+    /// One for each voxel of the segments, in their order.
     pub voxels: Vec<Change<K>>,
     /// How many of the voxels had no site before.
     pub reached: usize,
@@ -121,7 +121,7 @@ fn row<M: Metric, const X: i16, const Y: i16>(planes: &Planes<M>, look: &Look, a
     if wanted == 0 {
         return best;
     }
-    let at = at.wrapping_add(planes.layout.jump(X as isize, Y as isize));
+    let at = at.wrapping_add(planes.layout.jump::<X, Y>());
     let (key, offset) = (span(&planes.key, at), planes.offset.each_ref().map(|offset| span(offset, at)));
     let (Some(key), [Some(x), Some(y), Some(z)]) = (key, offset) else { return best };
     let best = if wanted & 1 != 0 { step::<M, X, Y, -1>(planes.metric, key, [x, y, z], best) } else { best };
@@ -153,19 +153,20 @@ fn span<T>(values: &[T], at: usize) -> Option<&[T; LANES + 2]> {
 /// Notes the new state of `voxels` of a segment.
 fn note<M: Metric>(planes: &Planes<M>, pass: u16, look: &Look, at: usize, best: &[M::Key; LANES], voxels: u16, found: &mut Found<M::Key>) {
     let (mut rest, mut ahead, front) = (voxels, 0, pass as i16);
+    let held = &planes.key[at..at + LANES];
+    found.voxels.reserve(LANES);
     while rest != 0 {
         let lane = rest.trailing_zeros() as usize;
         rest &= rest - 1;
         let (code, key) = M::split(best[lane]);
-        let [x, y, z] = delta(code);
-        let here = at + lane;
-        let from = here.wrapping_add(planes.layout.jump(isize::from(x), isize::from(y))).wrapping_add_signed(isize::from(z));
+        let ([x, y, z], jump) = planes.layout.moves[code];
+        let from = (at + lane).wrapping_add(jump);
         let offset = [planes.offset[0][from] - x, planes.offset[1][from] - y, planes.offset[2][from] - z];
         for axis in 0..3 {
             ahead |= u8::from(offset[axis] == front) << (2 * axis) | u8::from(offset[axis] == -front) << (2 * axis + 1);
         }
-        found.reached += usize::from(planes.key[here] == M::NONE);
-        found.voxels.push(Change { at: here as u32, key, offset });
+        found.reached += usize::from(held[lane] == M::NONE);
+        found.voxels.push(Change { key, offset });
     }
     found.segments.push(Changed { row: look.row, segment: look.segment, voxels, ahead });
 }
