@@ -234,7 +234,7 @@ def distance_transform(
     while it runs where the sampling has no whole ratios (1 : pi) or squares do not fit.
 
     On two threads, 512^3 voxels take 4 to 7 nanoseconds of processor time each, twice that with indices or signs; at
-    256^3, four times that with bounds, and where the sampling has no whole ratios; 200 to 3000 along axes at any angles.
+    256^3, four times that with bounds, and where the sampling has no whole ratios; 200 to 3000 along skewed axes.
 
     Bounds hold whatever rule made voxels of the surface. Unsigned: for every surface that stays within the voxels of
     the background and meets each of them that has a neighbour in the foreground. Signed or with labels: for every
