@@ -8,7 +8,7 @@ pub(crate) mod evaluate;
 mod frame;
 pub(crate) mod intersect;
 mod nearest;
-mod order;
+pub(crate) mod order;
 mod ray;
 pub(crate) mod tree;
 pub mod winding;

@@ -55,20 +55,22 @@ impl Tree {
 
     /// What `answer` makes of points that follow each other along the curve and of their nearest triangles.
     ///
-    /// It is given up to 1024 indices of points and as many candidates; which ones does not depend on the threads.
+    /// It is given up to 1024 points and as many candidates; which ones does not depend on the threads.
     pub(crate) fn nearest_along<T: Copy + Send>(
         &self,
         points: &[DVec3],
         run: &Run<'_>,
-        answer: impl Fn(&[u32], &[Candidate]) -> Vec<T> + Sync,
+        answer: impl Fn(&[DVec3], &[Candidate]) -> Vec<T> + Sync,
     ) -> Result<Vec<T>> {
         let order = Order::along_curve(points);
         let order = order.indices();
         let blocks = run.blocks("nearest points", order.len().div_ceil(CHUNK), |block| {
             let part = &order[block * CHUNK..((block + 1) * CHUNK).min(order.len())];
+            // Fetched together, so that one does not wait for the other.
+            let points: Vec<DVec3> = part.iter().map(|&index| points[index as usize]).collect();
             let mut found = vec![Candidate::within(f64::INFINITY); part.len()];
-            search_many(self, points, part, &mut found);
-            Ok(answer(part, &found))
+            search_many(self, &points, &mut found);
+            Ok(answer(&points, &found))
         })?;
         let Some(&any) = blocks.first().and_then(|block| block.first()) else { return Ok(Vec::new()) };
         let mut out = vec![any; points.len()];
@@ -80,13 +82,12 @@ impl Tree {
 }
 
 multiversion!(fn search(tree: &Tree, p: DVec3, best: Candidate) -> Candidate = search_body);
-multiversion!(fn search_many(tree: &Tree, points: &[DVec3], order: &[u32], out: &mut [Candidate]) = search_many_body);
+multiversion!(fn search_many(tree: &Tree, points: &[DVec3], out: &mut [Candidate]) = search_many_body);
 
 #[inline(always)]
-fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], order: &[u32], out: &mut [Candidate]) {
+fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], out: &mut [Candidate]) {
     let mut warm = Slot(0);
-    for (&index, out) in order.iter().zip(out) {
-        let p = points[index as usize];
+    for (&p, out) in points.iter().zip(out) {
         let start = Candidate { distance_squared: tree.facet_at(warm).distance_squared(p), triangle: tree.triangle(warm) };
         *out = search_body::<F>(tree, p, start);
         if out.found() {

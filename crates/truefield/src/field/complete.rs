@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use super::each::each;
+use super::each::each_along;
 use crate::bvh::Candidate;
 use crate::distance::{Closest, Distance};
 use crate::error::Result;
@@ -288,7 +288,7 @@ impl CompleteField {
 
     /// Signed distances, negative inside. A fraction of a microsecond a point where lists are short.
     pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
-        each(points, run, |p| {
+        each_along(points, run, |p| {
             let (distance, side) = self.distance_and_side(p);
             side.sign() * distance
         })
@@ -296,12 +296,12 @@ impl CompleteField {
 
     /// The intervals that contain the true signed distances.
     pub fn bounds(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Interval>> {
-        each(points, run, |p| self.at(p))
+        each_along(points, run, |p| self.at(p))
     }
 
     /// The nearest points of the surface.
     pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Nearest>> {
-        each(points, run, |p| self.surface.describe(p * self.surface.scale(), self.search(p).0))
+        each_along(points, run, |p| self.surface.describe(p * self.surface.scale(), self.search(p).0))
     }
 
     /// Counts and sizes.

@@ -121,10 +121,9 @@ impl Surface {
             scaled = points.iter().map(|&p| p * self.scale).collect();
             &scaled
         };
-        self.tree.nearest_along(points, run, |indices, found| {
+        self.tree.nearest_along(points, run, |points, found| {
             let mut walk = Walk::default();
-            let each = indices.iter().zip(found).map(|(&index, found)| {
-                let p = points[index as usize];
+            let each = points.iter().zip(found).map(|(&p, found)| {
                 let foot = self.tree.facet(found.triangle).nearest(p);
                 answer(p, found.triangle, &foot, walk.side(self, p, found.triangle, &foot))
             });
