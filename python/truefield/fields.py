@@ -97,9 +97,9 @@ class Surface(_Answering):
         threads: worker threads, all cores by default; results never depend on it.
         progress: called as `progress(phase, fraction)`.
 
-    Building takes O(m log m) for m triangles, some 4 microseconds a triangle. A query takes about a microsecond, up to
-    four near a surface that needs winding numbers. Vertices that only rounding keeps apart are taken for one to decide
-    sides, never distances, and `sign_rule` says so.
+    Building takes O(m log m) for m triangles, some 3 microseconds a triangle (scans of 70,000 to 90,000 triangles, two
+    threads). A query takes 0.2 to 1 microsecond on two threads, more next to open edges. Vertices that only rounding
+    keeps apart are taken for one to decide sides, never distances, and `sign_rule` says so.
 
     Raises:
         TruefieldError: the mesh or an argument cannot be used.
