@@ -251,3 +251,24 @@ def test_the_transform_of_a_scan_is_a_field_whose_bounds_hold(probes: Floats) ->
         assert np.abs(ball(mesh.vertices)).max() < np.linalg.norm(SPACING)
         grown = field.offset(0.1)
         assert np.all((grown.lower <= ball(nodes()) - 0.1) & (ball(nodes()) - 0.1 <= grown.upper))
+
+
+def test_nearest_points_are_on_the_surface(field: tf.SampledField, probes: Floats) -> None:
+    found = field.nearest(probes)
+    np.testing.assert_array_equal(found.distance, field.distance(probes))
+    np.testing.assert_array_equal(found.normal, field.gradient(probes))
+    assert (found.triangle == -1).all()
+    assert not found.feature.any()
+    # Only from around the middle, where there is no one way out, walking may miss.
+    there = np.asarray(np.isfinite(found.point).all(axis=1))
+    assert there[np.linalg.norm(probes, axis=1) > 0.15].all()
+    assert np.abs(ball(found.point[there])).max() < 0.01
+    lower, upper = field.bounds(found.point[there])
+    assert (lower <= 0.12).all()
+    assert (upper >= -0.12).all()
+    # The walk ends near the nearest point: no farther from it than the gradient of a cell can turn.
+    away = probes[there] * (0.6 / np.linalg.norm(probes[there], axis=1))[:, None]
+    assert np.median(np.linalg.norm(found.point[there] - away, axis=1)) < 0.01
+    outside = field.nearest([[9.0, 9.0, 9.0]])
+    assert np.isnan(outside.point).all()
+    assert np.isnan(outside.distance).all()

@@ -5,9 +5,10 @@ from truefield._truefield import __version__
 from truefield.check import MeshCheck
 from truefield.cloud import PointCloud
 from truefield.errors import FileError, TruefieldError
-from truefield.fields import CompleteField, Nearest, SignRule, Surface, complete_field
+from truefield.fields import CompleteField, SignRule, Surface, complete_field
 from truefield.io import read, read_points
 from truefield.mesh import TriangleMesh
+from truefield.nearest import Nearest
 from truefield.sampled import SampledField
 from truefield.sampling import Voxels, sampled_field, voxelize
 from truefield.storage import load

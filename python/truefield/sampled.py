@@ -16,6 +16,7 @@ from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
+from truefield.nearest import Nearest
 from truefield.volume import Volume
 
 Border = Literal["closed", "open"]
@@ -154,6 +155,23 @@ class SampledField:
         all the same.
         """
         return self._native.gradient(arguments.points(points), threads, progress)
+
+    def nearest(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Nearest:
+        """Where the surface is, from `points`, as far as samples tell: an estimate, found by walking down `distance`.
+
+        `.distance` and `.normal` are those of `distance` and `gradient`; `.point` lies where `distance` is zero up to a
+        thousandth of the spacing, so `bounds` of it says how far from the surface it may be; NaN outside the lattice,
+        and where walking finds no surface: beyond a band, or where it lies outside the lattice. Samples know of no
+        triangles: `.triangle` is -1 and `.feature` 0.
+        """
+        points = arguments.points(points)
+        return Nearest(
+            self.distance(points, threads=threads, progress=progress),
+            self._native.foot(points, threads, progress),
+            np.full(len(points), -1, np.int64),
+            np.zeros(len(points), np.uint8),
+            self.gradient(points, threads=threads, progress=progress),
+        )
 
     def surface(
         self,

@@ -184,6 +184,18 @@ impl PySampledField {
         rows(py, job(py, threads, progress, |run| self.0.gradients(&points, run))?.into_iter())
     }
 
+    #[pyo3(signature = (points, threads=None, progress=None))]
+    fn foot<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+        threads: Option<usize>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Points<'py>> {
+        let points = self::points(&points)?;
+        rows(py, job(py, threads, progress, |run| self.0.feet(&points, run))?.into_iter())
+    }
+
     fn complement(&self, py: Python<'_>) -> PyResult<Self> {
         self.derived(py, Some(1), None, |field, _| complement(field))
     }

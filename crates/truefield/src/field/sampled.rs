@@ -192,6 +192,28 @@ impl SampledField {
         Some(DVec3::new(slope(0), slope(1), slope(2)).normalize_or_zero())
     }
 
+    /// Where walking from `p` against the gradient, as far as the distance says each time, meets the surface: within a
+    /// thousandth of the spacing. `None` where it does not, or would have to leave the lattice.
+    pub fn foot(&self, p: DVec3) -> Option<DVec3> {
+        const STEPS: usize = 64;
+        let near = 1e-3 * self.lattice.spacing.min_element();
+        let extent = self.lattice.extent();
+        let mut at = p;
+        for _ in 0..STEPS {
+            let distance = self.interpolate(at)?;
+            if distance.abs() <= near {
+                return Some(at);
+            }
+            at = (at - self.gradient(at)? * distance).clamp(extent.min, extent.max);
+        }
+        None
+    }
+
+    /// [`SampledField::foot`] for many points; not numbers where there is none.
+    pub fn feet(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<DVec3>> {
+        each(points, run, |p| self.foot(p).unwrap_or(DVec3::NAN))
+    }
+
     /// [`SampledField::interpolate`] for many points; not a number outside the lattice.
     pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
         each(points, run, |p| self.interpolate(p).unwrap_or(f64::NAN))
