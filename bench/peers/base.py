@@ -39,9 +39,9 @@ class Solver(ABC):
             if values is not None:
                 values[rows] = self.values(answer, native)
 
-    def band(self, lattice: Lattice, cells: int, clock: Clock, values: NDArray[Any] | None) -> None:
+    def band(self, lattice: Lattice, cells: int, clock: Clock, values: NDArray[Any] | None) -> None:  # noqa: ARG002
         """Fills the lattice within `cells` cells of the surface; the rest of `values` stays NaN."""
-        raise NotImplementedError
+        raise ValueError(f"asked for a band of {cells} cells by a tool that makes none; see `Peer.jobs`")
 
 
 class Peer(ABC):

@@ -21,7 +21,7 @@ class _Mesh(Solver):
         self.mesh = mrmeshnumpy.meshFromFacesVerts(triangles.astype(np.int32), vertices.astype(np.float32))
 
     def ask(self, native: Any) -> Any:
-        raise NotImplementedError
+        raise ValueError(f"asked for {len(native)} points, and makes narrow bands only; see `Peer.jobs`")
 
     def band(self, lattice: Lattice, cells: int, clock: Clock, values: NDArray[Any] | None) -> None:
         lib, box = self.lib, self.lib.Box3i()

@@ -86,7 +86,7 @@ pub(crate) fn walls(
     let groups = tree.leaves().map(|triangles| triangles.iter().copied().filter(|&t| sound[t as usize]).collect::<Vec<u32>>());
     let groups: Vec<Vec<u32>> = groups.filter(|group| !group.is_empty()).collect();
     let chunk = |block: usize| &groups[block * CHUNK..((block + 1) * CHUNK).min(groups.len())];
-    let found = run.blocks("walls", groups.len().div_ceil(CHUNK), |block| {
+    let found = run.blocks("decide sides", groups.len().div_ceil(CHUNK), |block| {
         let spots = chunk(block).iter().map(|group| {
             let corners: Vec<DVec3> = group.iter().flat_map(|&t| mesh.corners(t)).collect();
             let all = Spot::around(&corners, boundary, f64::INFINITY);
@@ -103,7 +103,7 @@ pub(crate) fn walls(
         }
     }
     let known = hand_on(mesh, topology, &spots, winding, run)?;
-    let reached = run.blocks("walls", groups.len().div_ceil(CHUNK), |block| {
+    let reached = run.blocks("decide sides", groups.len().div_ceil(CHUNK), |block| {
         let start = block * CHUNK;
         let each = chunk(block).iter().zip(&groups_at[start..]).map(|(group, at)| {
             let mut steps = Steps::new(at, boundary);
