@@ -10,6 +10,9 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// Nothing is known.
+    pub const ALL: Self = Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+
     /// The interval that holds one value.
     pub const fn exact(value: f64) -> Self {
         Self { lower: value, upper: value }
@@ -45,5 +48,17 @@ impl Interval {
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
+    }
+
+    /// All sums of a number of one and a number of the other.
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self { lower: self.lower + other.lower, upper: self.upper + other.upper }
+    }
+
+    /// What lies in both; the ends change places where nothing does.
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Self {
+        Self { lower: self.lower.max(other.lower), upper: self.upper.min(other.upper) }
     }
 }
