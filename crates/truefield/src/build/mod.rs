@@ -1,5 +1,6 @@
 //! Builders: source to field.
 
+pub mod adaptive;
 pub mod complete;
 pub mod difference;
 pub mod march;

@@ -1,0 +1,258 @@
+//! A whole tree as flat arrays, level by level: what builders make and files hold. Its first levels are a coarser field.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use super::page::{Kind, Lists, PAGE_DEPTH, Page, Record, Samples, Word};
+use super::{AdaptiveField, Cell, Division, Leaf, MAX_DEPTH, Root};
+use crate::error::{Error, Result};
+use crate::field::Continuity;
+use crate::run::Run;
+use crate::source::mesh::Surface;
+
+/// What a cell of a level is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LevelKind {
+    /// The n-th branch of a level has the n-th group of siblings in the next.
+    Branch,
+    /// A leaf that interpolates its corners.
+    Linear,
+    /// The n-th such leaf has the n-th samples.
+    Cubic,
+    /// The n-th such leaf has the n-th list.
+    Exact,
+}
+
+/// All cells of one depth; siblings side by side, in the order of their parents.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Level {
+    /// What each cell is.
+    pub kinds: Vec<LevelKind>,
+    /// What is stored of each cell.
+    pub records: Vec<Record>,
+    /// Samples of tricubic leaves.
+    pub cubics: Vec<Samples>,
+    /// Triangles of exact leaves.
+    pub lists: Lists,
+}
+
+/// A tree as flat arrays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Levels {
+    /// Where it lies.
+    pub root: Root,
+    /// Where the sign can change.
+    pub continuity: Continuity,
+    /// From the root down.
+    pub levels: Vec<Level>,
+}
+
+impl Level {
+    /// Adds a cell that is no exact or tricubic leaf.
+    pub fn push(&mut self, kind: LevelKind, record: Record) {
+        self.kinds.push(kind);
+        self.records.push(record);
+    }
+
+    /// Adds all cells of another part of the level.
+    pub fn append(&mut self, mut other: Self) {
+        self.kinds.append(&mut other.kinds);
+        self.records.append(&mut other.records);
+        self.cubics.append(&mut other.cubics);
+        for number in 0..other.lists.ends.len() {
+            let (side, list) = other.lists.get(number);
+            self.lists.push(side, list);
+        }
+    }
+
+    /// Cells that have children.
+    pub fn branches(&self) -> usize {
+        self.count(LevelKind::Branch)
+    }
+
+    fn count(&self, kind: LevelKind) -> usize {
+        self.kinds.iter().filter(|&&k| k == kind).count()
+    }
+
+    /// How many cells of the same kind come before each.
+    fn ranks(&self) -> Vec<u32> {
+        let mut counts = [0u32; 4];
+        let rank = |kind: &LevelKind| {
+            let count = &mut counts[*kind as usize];
+            *count += 1;
+            *count - 1
+        };
+        self.kinds.iter().map(rank).collect()
+    }
+}
+
+impl Levels {
+    /// Widens the errors of cells to at least those of their children: a coarser tree never promises more.
+    pub fn make_monotone(&mut self) {
+        let group = self.root.division.children();
+        for depth in (1..self.levels.len()).rev() {
+            let (above, below) = self.levels.split_at_mut(depth);
+            let (Some(parents), Some(children)) = (above.last_mut(), below.first()) else { return };
+            let branches = parents.kinds.iter().zip(&mut parents.records).filter(|(kind, _)| **kind == LevelKind::Branch);
+            for ((_, parent), group) in branches.zip(children.records.chunks_exact(group)) {
+                for child in group {
+                    parent.lower = parent.lower.min(child.lower);
+                    parent.upper = parent.upper.max(child.upper);
+                }
+            }
+        }
+    }
+
+    /// What is wrong with the arrays, if anything is; `triangles` is the number of the surface's.
+    fn check(&self, triangles: usize) -> Result<()> {
+        let wrong =
+            |depth: usize, what: &str| Err(Error::Format(format!("level {depth} of the tree {what}; the file is damaged, write it again")));
+        let extent = self.root.extent;
+        if !(extent.min.is_finite() && extent.max.is_finite() && extent.min.cmplt(extent.max).all()) {
+            return Err(Error::Format("the domain of the tree is no box; the file is damaged, write it again".into()));
+        }
+        let group = self.root.division.children();
+        let mut expected = 1;
+        if self.levels.len() > MAX_DEPTH as usize + 1 {
+            return wrong(self.levels.len() - 1, "is too deep");
+        }
+        for (depth, level) in self.levels.iter().enumerate() {
+            if level.kinds.len() != expected || level.records.len() != expected {
+                return wrong(depth, "has not as many cells as its parents ask for");
+            }
+            if level.records.iter().any(|r| !r.corners.iter().all(|v| v.is_finite()) || !(r.lower <= r.upper)) {
+                return wrong(depth, "has corners or errors that are no numbers");
+            }
+            let lists = &level.lists;
+            let ascending = lists.ends.is_sorted() && lists.ends.last().map_or(0, |&end| end as usize) == lists.triangles.len();
+            if level.cubics.len() != level.count(LevelKind::Cubic)
+                || lists.ends.len() != level.count(LevelKind::Exact)
+                || lists.sides.len() != lists.ends.len()
+                || !ascending
+            {
+                return wrong(depth, "has not one list or set of samples for each leaf that needs one");
+            }
+            if lists.triangles.iter().any(|&t| t as usize >= triangles) || (triangles == 0 && !lists.ends.is_empty()) {
+                return wrong(depth, "names triangles that the part does not have");
+            }
+            if level.cubics.iter().flatten().any(|v| !v.is_finite()) {
+                return wrong(depth, "has samples that are no numbers");
+            }
+            expected = level.branches() * group;
+        }
+        if expected != 0 || self.levels.is_empty() {
+            return wrong(self.levels.len(), "is missing");
+        }
+        Ok(())
+    }
+}
+
+impl AdaptiveField {
+    /// From flat arrays; `surface` is what exact leaves name the triangles of.
+    pub fn from_levels(levels: &Levels, surface: Option<Arc<Surface>>, run: &Run<'_>) -> Result<Self> {
+        levels.check(surface.as_ref().map_or(0, |surface| surface.mesh().triangles().len()))?;
+        let ranks: Vec<Vec<u32>> = levels.levels.iter().map(Level::ranks).collect();
+        let source = Source { levels, ranks: &ranks, group: levels.root.division.children() };
+        let mut portals = Vec::new();
+        let top = source.page(0, 0, &mut portals);
+        let pages = run.blocks("put the tree together", portals.len(), |number| {
+            Ok(Arc::new(source.page(PAGE_DEPTH as usize, portals[number], &mut Vec::new())))
+        })?;
+        Ok(Self { root: levels.root, top: Arc::new(top), pages, surface, continuity: levels.continuity })
+    }
+
+    /// The tree as flat arrays.
+    pub fn to_levels(&self) -> Levels {
+        let mut levels: Vec<Level> = Vec::new();
+        let mut waiting = VecDeque::from([self.root()]);
+        while let Some(cell) = waiting.pop_front() {
+            let depth = cell.depth() as usize;
+            if levels.len() == depth {
+                levels.push(Level::default());
+            }
+            let level = &mut levels[depth];
+            let kind = match cell.leaf() {
+                _ if !cell.is_leaf() => LevelKind::Branch,
+                Leaf::Linear => LevelKind::Linear,
+                Leaf::Cubic(samples) => {
+                    level.cubics.push(*samples);
+                    LevelKind::Cubic
+                }
+                Leaf::Exact(list) => {
+                    level.lists.push(cell.list_side(), list);
+                    LevelKind::Exact
+                }
+            };
+            level.push(kind, *cell.record());
+            waiting.extend((0..cell.children()).map(|octant| cell.child(octant)));
+        }
+        Levels { root: self.root, continuity: self.continuity, levels }
+    }
+}
+
+/// Levels to make pages of.
+struct Source<'a> {
+    levels: &'a Levels,
+    ranks: &'a [Vec<u32>],
+    group: usize,
+}
+
+impl Source<'_> {
+    /// The page whose root is a cell; branches at the depth of pages, but for the root itself, become portals.
+    fn page(&self, depth: usize, cell: usize, portals: &mut Vec<usize>) -> Page {
+        let mut page = Page::default();
+        page.push(self.levels.levels[depth].records[cell]);
+        let mut waiting = VecDeque::from([(depth, cell, 0)]);
+        while let Some((at, cell, node)) = waiting.pop_front() {
+            let level = &self.levels.levels[at];
+            let rank = self.ranks[at][cell] as usize;
+            let kind = match level.kinds[cell] {
+                LevelKind::Branch if at == PAGE_DEPTH as usize && depth < at => {
+                    portals.push(cell);
+                    Kind::Portal(portals.len() as u32 - 1)
+                }
+                LevelKind::Branch => {
+                    let first = page.words.len();
+                    let below = &self.levels.levels[at + 1];
+                    for child in rank * self.group..(rank + 1) * self.group {
+                        let node = page.push(below.records[child]);
+                        waiting.push_back((at + 1, child, node));
+                    }
+                    Kind::Branch(first as u32)
+                }
+                LevelKind::Linear => Kind::Linear,
+                LevelKind::Cubic => {
+                    page.cubics.push(level.cubics[rank]);
+                    Kind::Cubic(page.cubics.len() as u32 - 1)
+                }
+                LevelKind::Exact => {
+                    let (side, list) = level.lists.get(rank);
+                    Kind::Exact(page.lists.push(side, list) as u32)
+                }
+            };
+            page.words[node] = Word::from(kind);
+        }
+        page.words.shrink_to_fit();
+        page.records.shrink_to_fit();
+        page
+    }
+}
+
+impl Division {
+    /// The division whose cells have so many children.
+    pub fn with_children(count: usize) -> Result<Self> {
+        match count {
+            8 => Ok(Self::Octree),
+            4 => Ok(Self::Quadtree),
+            _ => Err(Error::Format(format!("cells are divided into {count}; the file is damaged, write it again"))),
+        }
+    }
+}
+
+impl Cell<'_> {
+    /// Largest absolute end of the error.
+    pub fn largest_error(&self) -> f64 {
+        let error = self.error();
+        error.upper.max(-error.lower)
+    }
+}
