@@ -1,6 +1,6 @@
 """Distance fields that people can trust: every distance comes with an interval that contains the truth."""
 
-from truefield import shapes
+from truefield import csg, shapes
 from truefield._truefield import __version__
 from truefield.check import MeshCheck
 from truefield.cloud import PointCloud
@@ -11,6 +11,7 @@ from truefield.mesh import TriangleMesh
 from truefield.nearest import Nearest
 from truefield.sampled import SampledField
 from truefield.sampling import Voxels, sampled_field, voxelize
+from truefield.shape import Shape
 from truefield.storage import load
 from truefield.thickness import ThicknessReport, thickness
 from truefield.transform import DistanceTransform, distance_transform, voronoi
@@ -24,6 +25,7 @@ __all__ = [
     "Nearest",
     "PointCloud",
     "SampledField",
+    "Shape",
     "SignRule",
     "Surface",
     "ThicknessReport",
@@ -33,6 +35,7 @@ __all__ = [
     "Voxels",
     "__version__",
     "complete_field",
+    "csg",
     "distance_transform",
     "load",
     "read",

@@ -15,12 +15,14 @@ __all__ = [
     "CompleteField",
     "SampledField",
     "Scene",
+    "Shape",
     "Surface",
     "__version__",
     "check_mesh",
     "complete_field_from_parts",
     "complete_field_parts",
     "contour",
+    "cuboid",
     "distance_transform",
     "march",
     "sample",
@@ -29,6 +31,7 @@ __all__ = [
     "site_indices",
     "skewed_bounds",
     "skewed_transform",
+    "sphere",
     "thickness",
     "transform_bounds",
     "voxelize",
@@ -376,3 +379,18 @@ def complete_field_from_parts(
     threads: int | None = None,
     progress: _Progress = None,
 ) -> CompleteField: ...
+
+@final
+class Shape:
+    @staticmethod
+    def mesh(surface: Surface) -> Shape: ...
+    @property
+    def extent(self) -> tuple[list[float], list[float]] | None: ...
+    def distance(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
+    def bounds(
+        self, points: _Floats, threads: int | None = None, progress: _Progress = None
+    ) -> tuple[_Floats, _Floats]: ...
+    def gradient(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
+
+def sphere(radius: float, center: list[float]) -> Shape: ...
+def cuboid(size: list[float], radius: float, center: list[float]) -> Shape: ...

@@ -6,11 +6,13 @@
 mod check;
 mod contour;
 mod convert;
+mod csg;
 mod door;
 mod field;
 mod marching;
 mod render;
 mod sampled;
+mod shape;
 mod store;
 mod surface;
 mod thickness;
@@ -24,6 +26,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<surface::PySurface>()?;
     module.add_class::<field::PyCompleteField>()?;
     module.add_class::<sampled::PySampledField>()?;
+    module.add_class::<shape::PyShape>()?;
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
@@ -43,5 +46,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(marching::site_difference_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::sphere, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::cuboid, module)?)?;
     Ok(())
 }

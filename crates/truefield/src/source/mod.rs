@@ -1,3 +1,7 @@
 //! Shapes that can be asked their distance.
 
+mod ask;
+pub mod csg;
 pub mod mesh;
+
+pub use ask::{bounds, gradients, values};

@@ -4,6 +4,7 @@ mod check;
 mod layers;
 mod pseudonormal;
 mod sign;
+mod source;
 mod sum;
 mod walls;
 

@@ -202,6 +202,11 @@ impl Signs {
         nearest.distance_squared <= self.blur * self.blur
     }
 
+    /// Sides are doubtful no farther from the surface than this, where they change at the surface only.
+    pub fn blur(&self) -> f64 {
+        self.blur
+    }
+
     /// Whether the side can change at the surface only.
     pub fn changes_at_surface_only(&self) -> bool {
         self.parted

@@ -1,0 +1,117 @@
+//! Boxes along the axes, with sharp or round edges.
+
+use crate::distance::{Distance, Source};
+use crate::error::{Error, Result};
+use crate::geom::{Aabb, DVec3, Interval};
+
+use super::measure::{length, point, rounding};
+
+/// A box: all points within `rounding` of a core box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    center: DVec3,
+    /// Half the edges of the core; some may be 0 where edges are round.
+    core: DVec3,
+    rounding: f64,
+}
+
+impl Cuboid {
+    /// The box of positive edge lengths.
+    pub fn new(center: DVec3, size: DVec3) -> Result<Self> {
+        Self::rounded(center, size, 0.0)
+    }
+
+    /// The box whose edges and corners are rounded by a radius, at most half the shortest edge; 0: sharp.
+    pub fn rounded(center: DVec3, size: DVec3, radius: f64) -> Result<Self> {
+        for edge in size.to_array() {
+            length("an edge of the size", edge)?;
+        }
+        if !(radius >= 0.0 && radius <= 0.5 * size.min_element()) {
+            let most = 0.5 * size.min_element();
+            return Err(Error::invalid(format!("radius is {radius}; give 0 to {most}, half the shortest edge of the box")));
+        }
+        Ok(Self { center: point("center", center)?, core: 0.5 * size - radius, rounding: radius })
+    }
+
+    /// How far `p` lies beyond the faces of the core, per axis.
+    fn beyond(&self, p: DVec3) -> DVec3 {
+        (p - self.center).abs() - self.core
+    }
+
+    fn value(&self, p: DVec3) -> f64 {
+        let beyond = self.beyond(p);
+        beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0) - self.rounding
+    }
+
+    fn slope(&self, p: DVec3) -> DVec3 {
+        let beyond = self.beyond(p);
+        let toward = DVec3::ONE.copysign(p - self.center);
+        if beyond.max_element() > 0.0 {
+            return beyond.max(DVec3::ZERO).normalize() * toward;
+        }
+        DVec3::AXES[beyond.max_position()] * toward
+    }
+
+    /// Least and greatest `beyond` over a box.
+    fn range(&self, cell: &Aabb) -> (DVec3, DVec3) {
+        let (low, high) = (cell.min - self.center, cell.max - self.center);
+        let least = low.max(-high).max(DVec3::ZERO);
+        (least - self.core, low.abs().max(high.abs()) - self.core)
+    }
+}
+
+impl Distance for Cuboid {
+    fn extent(&self) -> Option<Aabb> {
+        let half = self.core + self.rounding;
+        Some(Aabb::new(self.center - half, self.center + half))
+    }
+
+    fn at(&self, p: DVec3) -> Interval {
+        Interval::exact(self.value(p))
+    }
+
+    /// Exact: the value grows with each coordinate's way beyond its faces.
+    fn over(&self, cell: &Aabb) -> Interval {
+        let of = |beyond: DVec3| beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0) - self.rounding;
+        let (low, high) = self.range(cell);
+        Interval { lower: of(low), upper: of(high) }.widen(self.noise())
+    }
+}
+
+impl Source for Cuboid {
+    fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
+        for (out, &p) in out.iter_mut().zip(points) {
+            *out = self.value(p);
+        }
+        Ok(())
+    }
+
+    fn gradients(&self, points: &[DVec3], out: &mut [DVec3]) -> Result<()> {
+        for (out, &p) in out.iter_mut().zip(points) {
+            *out = self.slope(p);
+        }
+        Ok(())
+    }
+
+    /// Nothing where one face is nearest all over the cell; beyond edges and corners a circle around them.
+    fn bend(&self, cell: &Aabb) -> Interval {
+        let (low, high) = self.range(cell);
+        let face = (0..3).any(|axis| {
+            let one_sided = cell.min[axis] >= self.center[axis] || cell.max[axis] <= self.center[axis];
+            let others = high[(axis + 1) % 3].max(high[(axis + 2) % 3]);
+            one_sided && others <= low[axis].min(0.0)
+        });
+        let upper = if face {
+            0.0
+        } else if low.max_element() > 0.0 {
+            (1.0 + 1e-12) / low.max(DVec3::ZERO).length()
+        } else {
+            f64::INFINITY
+        };
+        Interval { lower: 0.0, upper }
+    }
+
+    fn noise(&self) -> f64 {
+        rounding(self.extent())
+    }
+}
