@@ -4,12 +4,12 @@
 //! level are independent. The paper compares 19 points of a cell; here a cell is also proven, between its samples too
 //! (`verify`), whichever rule divides it.
 
-mod verify;
+pub(crate) mod verify;
 
 use crate::distance::Source;
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::field::adaptive::{AdaptiveField, Division, Level, LevelKind, Levels, MAX_DEPTH, Record, Root};
+use crate::field::adaptive::{Accuracy, AdaptiveField, Division, Level, LevelKind, Levels, MAX_DEPTH, Record, Root};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
@@ -74,23 +74,19 @@ impl Rules {
         }
     }
 
+    /// What edits will go on to ask.
+    pub(crate) fn accuracy(&self) -> Accuracy {
+        Accuracy { tolerance: self.tolerance, growth: self.growth, max_depth: self.max_depth }
+    }
+
     /// Refuses what cannot be asked for.
     pub(crate) fn check(&self) -> Result<()> {
-        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
-            return Err(Error::invalid(format!("the tolerance is {}; give a positive length", self.tolerance)));
-        }
-        if !(self.growth >= 0.0) {
-            return Err(Error::invalid(format!("the growth is {}; give 0 or more, or infinity for the surface only", self.growth)));
-        }
-        if self.max_depth > MAX_DEPTH {
-            return Err(Error::invalid(format!("max_depth is {}; give at most {MAX_DEPTH}", self.max_depth)));
-        }
-        Ok(())
+        self.accuracy().check()
     }
 
     /// The largest error of a cell no point of which is nearer to the surface than `least`.
     pub(crate) fn allowed(&self, least: f64) -> f64 {
-        if least > 0.0 { self.tolerance + self.growth * least } else { self.tolerance }
+        self.accuracy().allowed(least)
     }
 
     /// Refuses to go on where the next level would not fit.
@@ -144,7 +140,7 @@ pub fn adaptive(source: &dyn Source, root: Root, rules: &Rules, run: &Run<'_>) -
     let mut first = [0.0; 8];
     source.values(&corners, &mut first)?;
     let mut frontier = vec![Draft { index: [0; 3], corners: first }];
-    let mut levels = Levels { root, continuity: Continuity::Everywhere, levels: Vec::new() };
+    let mut levels = Levels::new(root, Continuity::Everywhere, rules.accuracy());
     let mut cells = 0;
     for depth in 0.. {
         let builder = Builder { source, root, rules, depth };

@@ -81,7 +81,8 @@ impl<'a> Cell<'a> {
     }
 
     /// Contains the distance minus what the record says, everywhere in the cell: the interpolated corners, in inner cells
-    /// and exact leaves too, or the tricubic interpolation in a leaf that has it.
+    /// and exact leaves too, or the tricubic interpolation in a leaf that has it. The distance is that of the shape after
+    /// the last edit that reached the cell; [`Cell::bounds`] and [`Cell::over`] know of the others too.
     pub fn error(&self) -> Interval {
         self.record().error()
     }
@@ -134,38 +135,47 @@ impl<'a> Cell<'a> {
 
     /// Contains the true distance at a point of the cell.
     pub fn bounds(&self, p: DVec3) -> Interval {
-        match self.leaf() {
+        let known = match self.leaf() {
             Leaf::Exact(_) => self.exact(p).map_or(Interval::ALL, |(distance, side)| {
                 if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
             }),
             // What a cubic leaf's record says of its interpolation is not what its corners say.
             Leaf::Cubic(samples) => self.error().plus(Interval::exact(cubic::value(samples, self.local(p)))),
             Leaf::Linear => self.error().plus(Interval::exact(self.record().value(self.local(p)))),
-        }
+        };
+        self.age(known, &Aabb::new(p, p))
     }
 
     /// Contains the true distance at every point of the cell.
     pub fn over(&self) -> Interval {
-        match self.leaf() {
-            Leaf::Cubic(samples) => {
-                let (lower, upper) = cubic::range(samples);
-                self.error().plus(Interval { lower, upper })
-            }
-            Leaf::Linear | Leaf::Exact(_) => self.error().plus(self.record().range()),
-        }
+        self.over_part(&self.extent())
     }
 
     /// Contains the true distance at every point of the part of the cell that lies in `part`.
-    pub(super) fn over_part(&self, part: &Aabb) -> Interval {
+    pub(crate) fn over_part(&self, part: &Aabb) -> Interval {
+        self.age(self.error().plus(self.said_over(part)), part)
+    }
+
+    /// Contains what the record says at every point of `part`; of an exact leaf and an inner cell, what the corners say.
+    pub(crate) fn said_over(&self, part: &Aabb) -> Interval {
         match self.leaf() {
-            Leaf::Cubic(_) => self.over(),
+            Leaf::Cubic(samples) => {
+                let (lower, upper) = cubic::range(samples);
+                Interval { lower, upper }
+            }
             Leaf::Linear | Leaf::Exact(_) => {
                 let cut = Aabb::new(self.local(part.min), self.local(part.max));
                 // Along each axis the interpolation is linear: its ends lie at corners of the cut.
                 let ends = (0..8).map(|corner| Interval::exact(self.record().value(cut.corner(corner))));
-                ends.reduce(Interval::hull).unwrap_or(Interval::ALL).plus(self.error())
+                ends.reduce(Interval::hull).unwrap_or(Interval::ALL)
             }
         }
+    }
+
+    /// What holds in a part of the cell after all edits, where `known` held when the cell was sampled.
+    #[inline]
+    fn age(&self, known: Interval, part: &Aabb) -> Interval {
+        if self.field.edits.list().is_empty() { known } else { self.field.edits.age(known, part, &self.extent()) }
     }
 
     /// Unsigned distance and side by the triangles of an exact leaf; `None` where the field has no surface.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::page::{Kind, Lists, PAGE_DEPTH, Page, Record, Samples, Word};
-use super::{AdaptiveField, Cell, Division, Leaf, MAX_DEPTH, Root};
+use super::{Accuracy, AdaptiveField, Cell, Division, Edits, Leaf, MAX_DEPTH, Root};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
 use crate::run::Run;
@@ -43,6 +43,10 @@ pub struct Levels {
     pub root: Root,
     /// Where the sign can change.
     pub continuity: Continuity,
+    /// What was asked of it.
+    pub accuracy: Accuracy,
+    /// What was changed since.
+    pub edits: Edits,
     /// From the root down.
     pub levels: Vec<Level>,
 }
@@ -87,6 +91,11 @@ impl Level {
 }
 
 impl Levels {
+    /// A tree without levels yet.
+    pub fn new(root: Root, continuity: Continuity, accuracy: Accuracy) -> Self {
+        Self { root, continuity, accuracy, edits: Edits::default(), levels: Vec::new() }
+    }
+
     /// Widens the errors of cells to at least those of their children: a coarser tree never promises more.
     pub fn make_monotone(&mut self) {
         let group = self.root.division.children();
@@ -110,6 +119,11 @@ impl Levels {
         let extent = self.root.extent;
         if !(extent.min.is_finite() && extent.max.is_finite() && extent.min.cmplt(extent.max).all()) {
             return Err(Error::Format("the domain of the tree is no box; the file is damaged, write it again".into()));
+        }
+        if self.accuracy.check().is_err() || !self.edits.is_sound() {
+            return Err(Error::Format(
+                "what was asked of the tree, or its edits, are no numbers; the file is damaged, write it again".into(),
+            ));
         }
         let group = self.root.division.children();
         let mut expected = 1;
@@ -158,7 +172,15 @@ impl AdaptiveField {
         let pages = run.blocks("put the tree together", portals.len(), |number| {
             Ok(Arc::new(source.page(PAGE_DEPTH as usize, portals[number], &mut Vec::new())))
         })?;
-        Ok(Self { root: levels.root, top: Arc::new(top), pages, surface, continuity: levels.continuity })
+        Ok(Self {
+            root: levels.root,
+            top: Arc::new(top),
+            pages,
+            surface,
+            continuity: levels.continuity,
+            accuracy: levels.accuracy,
+            edits: levels.edits.clone(),
+        })
     }
 
     /// The tree as flat arrays.
@@ -186,7 +208,7 @@ impl AdaptiveField {
             level.push(kind, *cell.record());
             waiting.extend((0..cell.children()).map(|octant| cell.child(octant)));
         }
-        Levels { root: self.root, continuity: self.continuity, levels }
+        Levels { root: self.root, continuity: self.continuity, accuracy: self.accuracy, edits: self.edits.clone(), levels }
     }
 }
 

@@ -4,15 +4,19 @@
 //! holds an interval that contains the distance minus what the corners say, so that every answer has bounds and a tree
 //! cut anywhere is a field again.
 
+mod accuracy;
 mod cell;
 mod cubic;
+mod edits;
 mod levels;
 mod page;
 
 use std::sync::Arc;
 
+pub use accuracy::Accuracy;
 pub use cell::{Cell, Leaf, Root};
 pub(crate) use cubic::{bends, value as cubic_value};
+pub use edits::{Change, Edit, Edits};
 pub use levels::{Level, LevelKind, Levels};
 pub(crate) use page::{Kind, Page};
 pub use page::{ListSide, Lists, Record, Samples};
@@ -75,6 +79,8 @@ pub struct AdaptiveField {
     /// Whose triangles exact leaves name.
     surface: Option<Arc<Surface>>,
     continuity: Continuity,
+    accuracy: Accuracy,
+    edits: Edits,
 }
 
 /// Counts and sizes.
@@ -120,6 +126,16 @@ impl AdaptiveField {
     /// Where the sign can change.
     pub fn continuity(&self) -> Continuity {
         self.continuity
+    }
+
+    /// What was asked of it.
+    pub fn accuracy(&self) -> Accuracy {
+        self.accuracy
+    }
+
+    /// What was changed since it was built.
+    pub fn edits(&self) -> &Edits {
+        &self.edits
     }
 
     /// The cell that is the whole domain.

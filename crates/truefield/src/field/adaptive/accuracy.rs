@@ -1,0 +1,36 @@
+//! How near to the truth a tree was asked to be.
+
+use super::MAX_DEPTH;
+use crate::error::{Error, Result};
+
+/// What was asked of a tree, and what edits of it go on to ask.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accuracy {
+    /// Largest error at the surface, a length.
+    pub tolerance: f64,
+    /// How much the error may grow per unit of distance from the surface; may be infinite.
+    pub growth: f64,
+    /// No cell is divided at this depth, whatever its error.
+    pub max_depth: u32,
+}
+
+impl Accuracy {
+    /// Refuses what cannot be asked for.
+    pub(crate) fn check(&self) -> Result<()> {
+        if !(self.tolerance > 0.0 && self.tolerance.is_finite()) {
+            return Err(Error::invalid(format!("the tolerance is {}; give a positive length", self.tolerance)));
+        }
+        if !(self.growth >= 0.0) {
+            return Err(Error::invalid(format!("the growth is {}; give 0 or more, or infinity for the surface only", self.growth)));
+        }
+        if self.max_depth > MAX_DEPTH {
+            return Err(Error::invalid(format!("max_depth is {}; give at most {MAX_DEPTH}", self.max_depth)));
+        }
+        Ok(())
+    }
+
+    /// The largest error of a cell no point of which is nearer to the surface than `least`.
+    pub(crate) fn allowed(&self, least: f64) -> f64 {
+        if least > 0.0 { self.tolerance + self.growth * least } else { self.tolerance }
+    }
+}
