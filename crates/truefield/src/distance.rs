@@ -86,6 +86,11 @@ pub trait Source: Distance {
         Interval::ALL
     }
 
+    /// Whether the shape does not depend on z: it has the same cross-section at every height.
+    fn is_flat(&self) -> bool {
+        false
+    }
+
     /// No less than how far solving or rounding can move a value from one that changes by no more than one moves.
     fn noise(&self) -> f64 {
         0.0

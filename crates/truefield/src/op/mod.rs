@@ -4,6 +4,7 @@
 //! distances is the distance of the union outside of both, and only a bound of it inside.
 
 pub mod boolean;
+pub mod edit;
 pub mod offset;
 pub mod resample;
 mod solid;

@@ -12,7 +12,7 @@ use crate::field::adaptive::{Division, Record, Samples, bends, cubic_value};
 use crate::geom::{Aabb, DVec3, Interval};
 
 /// Where the samples of a cell lie: on a lattice of so many steps along an edge.
-pub(super) struct Block {
+pub(crate) struct Block {
     steps: usize,
     /// Steps along z: none in a quadtree.
     steps_z: usize,
@@ -21,7 +21,7 @@ pub(super) struct Block {
 }
 
 /// What was found out about a cell.
-pub(super) struct Found {
+pub(crate) struct Found {
     /// Contains the value minus the interpolated corners, which are rounded to single precision.
     pub linear: Interval,
     /// The largest difference at the samples.
@@ -32,7 +32,7 @@ pub(super) struct Found {
     pub least: f64,
 }
 
-pub(super) struct FoundCubic {
+pub(crate) struct FoundCubic {
     pub error: Interval,
     pub samples: f64,
     pub thirds: Samples,

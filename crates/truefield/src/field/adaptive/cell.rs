@@ -172,6 +172,44 @@ impl<'a> Cell<'a> {
         }
     }
 
+    /// Contains what the leaves of the cell say at every point of `part`.
+    pub(crate) fn values_over(&self, part: &Aabb) -> Interval {
+        let said = self.said_over(part);
+        match self.leaf() {
+            // The error of a branch contains those of its leaves.
+            _ if !self.is_leaf() => said.widen(self.error().width()),
+            Leaf::Exact(_) => said.plus(self.error()),
+            Leaf::Linear | Leaf::Cubic(_) => said,
+        }
+    }
+
+    /// Contains the distance minus what the leaf says at every point of `part`, after all edits.
+    pub(crate) fn error_over(&self, part: &Aabb) -> Interval {
+        let (sampled, said) = match self.leaf() {
+            Leaf::Exact(_) => (Interval::exact(0.0), self.values_over(part)),
+            Leaf::Linear | Leaf::Cubic(_) => (self.error(), self.values_over(part)),
+        };
+        let before = said.plus(sampled);
+        aged_error(sampled, said, before, self.age(before, part))
+    }
+
+    /// A bound of the slope of what a leaf says.
+    pub(crate) fn steepest(&self) -> f64 {
+        match self.leaf() {
+            Leaf::Linear => self.record().steepest(self.extent().size()),
+            Leaf::Cubic(samples) => (cubic::steepest(samples) / self.extent().size()).length(),
+            Leaf::Exact(_) => 1.0,
+        }
+    }
+
+    /// Contains the second derivatives of what a leaf says.
+    pub(crate) fn bend(&self) -> Interval {
+        match self.leaf() {
+            Leaf::Linear => Interval::either_side(self.record().bend(self.extent().size())),
+            Leaf::Cubic(_) | Leaf::Exact(_) => Interval::ALL,
+        }
+    }
+
     /// What holds in a part of the cell after all edits, where `known` held when the cell was sampled.
     #[inline]
     fn age(&self, known: Interval, part: &Aabb) -> Interval {
@@ -200,6 +238,14 @@ impl<'a> Cell<'a> {
             best.offer(surface.tree().facet(triangle).distance_squared(p), triangle);
         }
         if list.is_empty() { surface.tree().nearest(p, best) } else { best }
+    }
+}
+
+/// The error after edits, from that before, what is said, and what is known of the distance before and after.
+pub(crate) fn aged_error(error: Interval, said: Interval, before: Interval, after: Interval) -> Interval {
+    Interval {
+        lower: if after.lower < before.lower { error.lower.min(after.lower - said.upper) } else { error.lower },
+        upper: if after.upper > before.upper { error.upper.max(after.upper - said.lower) } else { error.upper },
     }
 }
 

@@ -69,6 +69,18 @@ pub(crate) fn bends(samples: &Samples) -> DVec3 {
     DVec3::new(bend(N * N), bend(N), bend(1))
 }
 
+/// No less than the slopes along the three axes, per cell.
+pub(crate) fn steepest(samples: &Samples) -> DVec3 {
+    let c = control(samples);
+    let slope = |stride: usize| 3.0 * (0..64).filter(|n| n / stride % N != 0).map(|at| (c[at] - c[at - stride]).abs()).fold(0.0, f64::max);
+    DVec3::new(slope(N * N), slope(N), slope(1))
+}
+
+/// Where samples lie in a cell, coordinates from 0 to 1.
+pub(crate) fn third(sample: usize) -> DVec3 {
+    DVec3::new((sample / 16) as f64, (sample / 4 % 4) as f64, (sample % 4) as f64) / 3.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +102,7 @@ mod tests {
             assert!((found - cubic(at)).abs() < 1e-5, "{found} is not {} at {at}", cubic(at));
             assert!(low <= found + 1e-9 && found <= high + 1e-9);
             let slopes = gradient(&samples, at);
+            assert!(slopes.abs().cmple(steepest(&samples) + 1e-9).all());
             for axis in 0..3 {
                 let (mut before, mut after) = (at, at);
                 (before[axis], after[axis]) = (at[axis] - step, at[axis] + step);

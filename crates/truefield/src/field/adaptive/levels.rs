@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::page::{Kind, Lists, PAGE_DEPTH, Page, Record, Samples, Word};
+use super::assemble::{Shape, Tree, page};
+use super::page::{Lists, PAGE_DEPTH, Record, Samples};
 use super::{Accuracy, AdaptiveField, Cell, Division, Edits, Leaf, MAX_DEPTH, Root};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
@@ -166,11 +167,11 @@ impl AdaptiveField {
     pub fn from_levels(levels: &Levels, surface: Option<Arc<Surface>>, run: &Run<'_>) -> Result<Self> {
         levels.check(surface.as_ref().map_or(0, |surface| surface.mesh().triangles().len()))?;
         let ranks: Vec<Vec<u32>> = levels.levels.iter().map(Level::ranks).collect();
-        let source = Source { levels, ranks: &ranks, group: levels.root.division.children() };
+        let flat = Flat { levels, ranks: &ranks, group: levels.root.division.children() };
         let mut portals = Vec::new();
-        let top = source.page(0, 0, &mut portals);
+        let top = page(&flat, (0, 0), 0, &mut portals);
         let pages = run.blocks("put the tree together", portals.len(), |number| {
-            Ok(Arc::new(source.page(PAGE_DEPTH as usize, portals[number], &mut Vec::new())))
+            Ok(Arc::new(page(&flat, portals[number], PAGE_DEPTH, &mut Vec::new())))
         })?;
         Ok(Self {
             root: levels.root,
@@ -213,50 +214,35 @@ impl AdaptiveField {
 }
 
 /// Levels to make pages of.
-struct Source<'a> {
+struct Flat<'a> {
     levels: &'a Levels,
     ranks: &'a [Vec<u32>],
     group: usize,
 }
 
-impl Source<'_> {
-    /// The page whose root is a cell; branches at the depth of pages, but for the root itself, become portals.
-    fn page(&self, depth: usize, cell: usize, portals: &mut Vec<usize>) -> Page {
-        let mut page = Page::default();
-        page.push(self.levels.levels[depth].records[cell]);
-        let mut waiting = VecDeque::from([(depth, cell, 0)]);
-        while let Some((at, cell, node)) = waiting.pop_front() {
-            let level = &self.levels.levels[at];
-            let rank = self.ranks[at][cell] as usize;
-            let kind = match level.kinds[cell] {
-                LevelKind::Branch if at == PAGE_DEPTH as usize && depth < at => {
-                    portals.push(cell);
-                    Kind::Portal(portals.len() as u32 - 1)
-                }
-                LevelKind::Branch => {
-                    let first = page.words.len();
-                    let below = &self.levels.levels[at + 1];
-                    for child in rank * self.group..(rank + 1) * self.group {
-                        let node = page.push(below.records[child]);
-                        waiting.push_back((at + 1, child, node));
-                    }
-                    Kind::Branch(first as u32)
-                }
-                LevelKind::Linear => Kind::Linear,
-                LevelKind::Cubic => {
-                    page.cubics.push(level.cubics[rank]);
-                    Kind::Cubic(page.cubics.len() as u32 - 1)
-                }
-                LevelKind::Exact => {
-                    let (side, list) = level.lists.get(rank);
-                    Kind::Exact(page.lists.push(side, list) as u32)
-                }
-            };
-            page.words[node] = Word::from(kind);
+impl Tree for Flat<'_> {
+    /// Depth and number.
+    type Node = (u32, u32);
+
+    fn record(&self, (depth, cell): Self::Node) -> Record {
+        self.levels.levels[depth as usize].records[cell as usize]
+    }
+
+    fn shape(&self, (depth, cell): Self::Node, children: &mut Vec<Self::Node>) -> Shape<'_> {
+        let level = &self.levels.levels[depth as usize];
+        let rank = self.ranks[depth as usize][cell as usize] as usize;
+        match level.kinds[cell as usize] {
+            LevelKind::Branch => {
+                children.extend((rank * self.group..(rank + 1) * self.group).map(|child| (depth + 1, child as u32)));
+                Shape::Branch
+            }
+            LevelKind::Linear => Shape::Linear,
+            LevelKind::Cubic => Shape::Cubic(&level.cubics[rank]),
+            LevelKind::Exact => {
+                let (side, list) = level.lists.get(rank);
+                Shape::Exact(side, list)
+            }
         }
-        page.words.shrink_to_fit();
-        page.records.shrink_to_fit();
-        page
     }
 }
 

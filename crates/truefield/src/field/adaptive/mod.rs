@@ -5,6 +5,7 @@
 //! cut anywhere is a field again.
 
 mod accuracy;
+mod assemble;
 mod cell;
 mod cubic;
 mod edits;
@@ -14,8 +15,11 @@ mod page;
 use std::sync::Arc;
 
 pub use accuracy::Accuracy;
+pub(crate) use assemble::{Patch, Patched};
+pub(crate) use cell::aged_error;
 pub use cell::{Cell, Leaf, Root};
-pub(crate) use cubic::{bends, value as cubic_value};
+pub(crate) use cubic::{bends, range as cubic_range, third as cubic_third, value as cubic_value};
+pub(crate) use edits::farthest;
 pub use edits::{Change, Edit, Edits};
 pub use levels::{Level, LevelKind, Levels};
 pub(crate) use page::{Kind, Page};
@@ -151,7 +155,11 @@ impl AdaptiveField {
         }
         let finest = f64::from(1u32 << MAX_DEPTH);
         let at = ((p - min) / (max - min) * finest).min(DVec3::splat(finest - 1.0));
-        let at = [at.x as u32, at.y as u32, at.z as u32];
+        Some(self.find_at([at.x as u32, at.y as u32, at.z as u32]))
+    }
+
+    /// The leaf that holds the cell of the greatest depth with an index.
+    fn find_at(&self, at: [u32; 3]) -> Cell<'_> {
         let (mut page, mut node, mut depth) = (&*self.top, 0, 0);
         loop {
             match page.words[node].kind() {
@@ -169,7 +177,40 @@ impl AdaptiveField {
         if self.root.division == Division::Quadtree {
             index[2] = 0;
         }
-        Some(Cell { field: self, page, node, depth, index })
+        Cell { field: self, page, node, depth, index }
+    }
+
+    /// The value at a corner of the cell of some depth and index, the same whichever cell it is a corner of: that of the
+    /// leaves of which it is a corner too, or else what the uppermost leaf says there.
+    pub(crate) fn corner_value(&self, depth: u32, index: [u32; 3], corner: usize) -> f64 {
+        let axes = self.root.division.axes();
+        let shift = MAX_DEPTH - depth;
+        // In cells of the greatest depth; a quadtree has one along z.
+        let place: [u32; 3] =
+            std::array::from_fn(|axis| if axis < axes { (index[axis] + (corner as u32 >> axis & 1)) << shift } else { 0 });
+        let end = (1u32 << MAX_DEPTH) - 1;
+        let mut uppermost = None;
+        for side in 0..1usize << axes {
+            let below = |axis: usize| side >> axis & 1 == 1;
+            if (0..axes).any(|axis| below(axis) && (place[axis] == 0 || place[axis] > end)) {
+                continue;
+            }
+            let at = std::array::from_fn(|axis| if below(axis) { place[axis] - 1 } else { place[axis].min(end) });
+            let leaf = self.find_at(at);
+            let shift = MAX_DEPTH - leaf.depth;
+            let within = |axis: usize| place[axis] - (leaf.index[axis] << shift);
+            if (0..axes).all(|axis| within(axis) & ((1 << shift) - 1) == 0) {
+                let own =
+                    (0..axes).map(|axis| usize::from(within(axis) != 0) << axis).sum::<usize>() | (corner & if axes == 2 { 4 } else { 0 });
+                return f64::from(leaf.corners()[own]);
+            }
+            uppermost.get_or_insert(leaf);
+            if (0..axes).all(|axis| within(axis) & ((1 << shift) - 1) != 0) {
+                break;
+            }
+        }
+        let p = self.root.cell(depth, index).corner(corner);
+        uppermost.map_or(f64::NAN, |leaf| leaf.value(p))
     }
 
     /// What the field says: interpolated, or exact in exact leaves; `None` outside the domain.

@@ -43,6 +43,28 @@ impl Record {
         DVec3::new(slope(1, [0, 2, 4, 6], at.y, at.z), slope(2, [0, 1, 4, 5], at.x, at.z), slope(4, [0, 1, 2, 3], at.x, at.y))
     }
 
+    /// No less than the slope of the interpolation anywhere in a cell of this size.
+    pub(crate) fn steepest(&self, size: DVec3) -> f64 {
+        let c = self.corners.map(f64::from);
+        let along = |axis: usize| {
+            let step = 1 << axis;
+            (0..8).filter(|corner| corner & step == 0).map(|low| (c[low + step] - c[low]).abs()).fold(0.0, f64::max)
+        };
+        (DVec3::new(along(0), along(1), along(2)) / size).length()
+    }
+
+    /// No less than the absolute second derivative of the interpolation along any line in a cell of this size.
+    pub(crate) fn bend(&self, size: DVec3) -> f64 {
+        let c = self.corners.map(f64::from);
+        // Along the axes it is linear; along a line the mixed derivatives count twice the product of two parts of a unit.
+        let mixed = |a: usize, b: usize| {
+            let (step, other, third) = (1 << a, 1 << b, 7 - (1 << a) - (1 << b));
+            let twist = |low: usize| (c[low] - c[low + step] - c[low + other] + c[low + step + other]).abs();
+            twist(0).max(twist(third)) / (size[a] * size[b])
+        };
+        mixed(0, 1) + mixed(0, 2) + mixed(1, 2)
+    }
+
     /// Least and largest corner.
     pub fn range(&self) -> Interval {
         let fold = |f: fn(f32, f32) -> f32| f64::from(self.corners.iter().copied().fold(self.corners[0], f));
