@@ -72,7 +72,9 @@ pub(crate) fn bends(samples: &Samples) -> DVec3 {
 /// No less than the slopes along the three axes, per cell.
 pub(crate) fn steepest(samples: &Samples) -> DVec3 {
     let c = control(samples);
-    let slope = |stride: usize| 3.0 * (0..64).filter(|n| n / stride % N != 0).map(|at| (c[at] - c[at - stride]).abs()).fold(0.0, f64::max);
+    let slope = |stride: usize| {
+        3.0 * (0..64).filter(|n| !(n / stride).is_multiple_of(N)).map(|at| (c[at] - c[at - stride]).abs()).fold(0.0, f64::max)
+    };
     DVec3::new(slope(N * N), slope(N), slope(1))
 }
 

@@ -94,9 +94,9 @@ impl<'a> Divider<'a> {
             let parts = run.blocks("edit the field", level.len().div_ceil(CHUNK), |block| {
                 self.divide(&level[block * CHUNK..((block + 1) * CHUNK).min(level.len())])
             })?;
-            let mut number = first;
+            let before = first;
             first = pieces.len();
-            for outcome in parts.into_iter().flatten() {
+            for (number, outcome) in (before..).zip(parts.into_iter().flatten()) {
                 match outcome {
                     Outcome::Kept => pieces[number].inside = self.inside_kept(&pieces[number].old),
                     Outcome::Leaf(made, inside) => {
@@ -112,7 +112,6 @@ impl<'a> Divider<'a> {
                         }
                     }
                 }
-                number += 1;
             }
             let needed = pieces.len() as u64 * DRAFT;
             if needed > self.memory {
@@ -147,9 +146,9 @@ impl<'a> Divider<'a> {
         let mut samples = points.chunks_exact(size).zip(values.chunks_exact(size));
         for ((outcome, piece), extent) in out.iter_mut().zip(pieces).zip(&extents) {
             if let Outcome::Sample(known, alone) = *outcome
-                && let Some((points, values)) = samples.next()
+                && let Some(asked) = samples.next()
             {
-                *outcome = self.sample(piece, extent, &block, &known, alone, points, values);
+                *outcome = self.sample(piece, extent, &block, &known, alone, asked);
             }
         }
         Ok(out)
@@ -266,8 +265,7 @@ impl<'a> Divider<'a> {
         block: &Block,
         known: &Known,
         alone: Alone,
-        points: &[DVec3],
-        values: &[f64],
+        (points, values): (&[DVec3], &[f64]),
     ) -> Outcome<'a> {
         let turned = self.turned;
         let combined: Vec<f64> = points
