@@ -172,6 +172,12 @@ impl Sets {
         Self((0..count as u32).collect())
     }
 
+    /// Starts anew.
+    pub fn reset(&mut self, count: usize) {
+        self.0.clear();
+        self.0.extend(0..count as u32);
+    }
+
     pub fn find(&mut self, mut x: u32) -> u32 {
         while self.0[x as usize] != x {
             let up = self.0[self.0[x as usize] as usize];

@@ -1,7 +1,10 @@
 //! What people want from a field or a mesh.
 
+pub mod collide;
 pub mod contour;
+pub mod dual;
 pub mod medial;
+pub mod raycast;
 pub mod render;
 pub mod sampled;
 pub mod surface;

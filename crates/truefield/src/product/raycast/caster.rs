@@ -1,0 +1,159 @@
+//! A tree made ready for rays: cells that the surface does not meet are one with their neighbours of the same side.
+
+use crate::error::{Error, Result};
+use crate::field::adaptive::{AdaptiveField, Cell, Division, Leaf};
+use crate::geom::{Aabb, DVec3};
+use crate::run::Run;
+
+/// Cells of this depth are looked at as blocks of their own.
+const BLOCK_DEPTH: u32 = 3;
+
+/// What a child is: two bits of its word; the others are a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Child {
+    /// Number of a node.
+    Branch(u32),
+    /// Number of the corners of a trilinear leaf with corners of both sides.
+    Linear(u32),
+    /// Number of a leaf that answers in another way.
+    Other(u32),
+    /// All of one side; whether that is the inside.
+    Empty(bool),
+}
+
+const SHIFT: u32 = 30;
+
+impl Child {
+    #[inline(always)]
+    pub fn of(word: u32) -> Self {
+        let number = word & ((1 << SHIFT) - 1);
+        match word >> SHIFT {
+            0 => Self::Branch(number),
+            1 => Self::Linear(number),
+            2 => Self::Other(number),
+            _ => Self::Empty(number == 1),
+        }
+    }
+
+    fn word(self) -> u32 {
+        match self {
+            Self::Branch(number) => number,
+            Self::Linear(number) => 1 << SHIFT | number,
+            Self::Other(number) => 2 << SHIFT | number,
+            Self::Empty(inside) => 3 << SHIFT | u32::from(inside),
+        }
+    }
+}
+
+/// A field prepared for rays that look for one distance.
+///
+/// Makes no more than 36 bytes of every cell that the surface meets, and of those above it; making it takes one look at
+/// every cell.
+#[derive(Debug)]
+pub struct Caster {
+    pub(super) field: AdaptiveField,
+    pub(super) distance: f64,
+    pub(super) extent: Aabb,
+    pub(super) columns: bool,
+    pub(super) root: u32,
+    /// Children as words; of columns the upper four are not used.
+    pub(super) nodes: Vec<[u32; 8]>,
+    /// Corners of trilinear leaves.
+    pub(super) corners: Vec<[f32; 8]>,
+    /// Middles of leaves that answer in another way.
+    pub(super) others: Vec<DVec3>,
+}
+
+/// Part of a caster while it is made.
+#[derive(Default)]
+struct Part {
+    nodes: Vec<[u32; 8]>,
+    corners: Vec<[f32; 8]>,
+    others: Vec<DVec3>,
+}
+
+impl Caster {
+    /// Prepares a field for the surface at a signed distance.
+    pub fn new(field: &AdaptiveField, distance: f64, run: &Run<'_>) -> Result<Self> {
+        if !distance.is_finite() {
+            return Err(Error::invalid(format!("the distance of the surface is {distance}; give a finite length")));
+        }
+        let mut blocks = Vec::new();
+        field.walk(&mut |cell| {
+            let block = cell.is_leaf() || cell.depth() == BLOCK_DEPTH;
+            if block {
+                blocks.push(cell);
+            }
+            !block
+        });
+        let parts = run.blocks("prepare for rays", blocks.len(), |number| {
+            let mut part = Part::default();
+            let root = part.add(blocks[number], distance);
+            Ok((part, root))
+        })?;
+        let mut whole = Part::default();
+        let roots: Vec<Child> = parts.into_iter().map(|(part, root)| whole.append(part, root)).collect();
+        let root = whole.join(field.root(), &mut roots.into_iter()).word();
+        let Part { nodes, corners, others } = whole;
+        let columns = field.division() == Division::Quadtree;
+        Ok(Self { field: field.clone(), distance, extent: field.extent_box(), columns, root, nodes, corners, others })
+    }
+}
+
+impl Part {
+    fn add(&mut self, cell: Cell<'_>, distance: f64) -> Child {
+        let count = cell.children();
+        if count == 0 {
+            let below = cell.corners().iter().filter(|&&v| f64::from(v) < distance).count();
+            return match cell.leaf() {
+                Leaf::Linear if below % 8 != 0 => {
+                    self.corners.push(*cell.corners());
+                    Child::Linear(self.corners.len() as u32 - 1)
+                }
+                Leaf::Cubic(_) | Leaf::Exact(_) if below % 8 != 0 || cell.over().contains(distance) => {
+                    self.others.push(cell.extent().center());
+                    Child::Other(self.others.len() as u32 - 1)
+                }
+                _ => Child::Empty(below == 8),
+            };
+        }
+        let children: [Child; 8] =
+            std::array::from_fn(|octant| if octant < count { self.add(cell.child(octant), distance) } else { Child::Empty(false) });
+        self.node(&children[..count])
+    }
+
+    /// A node, or what all its children are.
+    fn node(&mut self, children: &[Child]) -> Child {
+        if let Child::Empty(_) = children[0]
+            && children.iter().all(|child| *child == children[0])
+        {
+            return children[0];
+        }
+        self.nodes.push(std::array::from_fn(|octant| children[octant % children.len()].word()));
+        Child::Branch(self.nodes.len() as u32 - 1)
+    }
+
+    /// Adds a part made apart; returns what its root is now.
+    fn append(&mut self, other: Self, root: Child) -> Child {
+        let (nodes, corners, others) = (self.nodes.len() as u32, self.corners.len() as u32, self.others.len() as u32);
+        let moved = |child: Child| match child {
+            Child::Branch(number) => Child::Branch(number + nodes),
+            Child::Linear(number) => Child::Linear(number + corners),
+            Child::Other(number) => Child::Other(number + others),
+            Child::Empty(_) => child,
+        };
+        self.nodes.extend(other.nodes.into_iter().map(|node| node.map(|word| moved(Child::of(word)).word())));
+        self.corners.extend(other.corners);
+        self.others.extend(other.others);
+        moved(root)
+    }
+
+    /// The nodes above the blocks, which come in the order of the walk.
+    fn join(&mut self, cell: Cell<'_>, blocks: &mut impl Iterator<Item = Child>) -> Child {
+        if cell.is_leaf() || cell.depth() == BLOCK_DEPTH {
+            return blocks.next().unwrap_or(Child::Empty(false));
+        }
+        let children: Vec<Child> = (0..cell.children()).map(|octant| self.join(cell.child(octant), blocks)).collect();
+        self.node(&children)
+    }
+}

@@ -1,0 +1,306 @@
+//! The way of a ray through the tree, cell by cell, front to back.
+//!
+//! Each ray is turned so that it runs towards high coordinates along every axis (Revelles, Urena and Lastra 2000), and
+//! the next cell is found by the bits of the last one's place (Laine and Karras 2010). The parameter of a plane of the
+//! tree is always computed in one way, so that one cell ends where the next begins.
+
+use super::Method;
+use super::along::{bernstein, first_change, first_root, trilinear};
+use super::caster::{Caster, Child};
+use crate::field::adaptive::MAX_DEPTH;
+use crate::geom::DVec3;
+
+/// Edge of the root in units of the finest cells.
+const FULL: u32 = 1 << MAX_DEPTH;
+
+/// Stands for the reciprocal of zero.
+const STEEP: f64 = 1e100;
+
+/// A tricubic interpolation of a distance may change somewhat faster than the distance.
+const SLOPE: f64 = 1.5;
+
+/// What a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance from the origin, model units.
+    pub distance: f64,
+    /// The place.
+    pub point: DVec3,
+    /// Unit gradient of the field there: outward.
+    pub normal: DVec3,
+}
+
+impl Hit {
+    /// No hit.
+    pub const NONE: Self = Self { distance: f64::INFINITY, point: DVec3::NAN, normal: DVec3::NAN };
+}
+
+/// A place where the side changes, in the frame of the walk.
+struct Found {
+    t: f64,
+    at: At,
+}
+
+/// In which cell the gradient is to be taken.
+#[derive(Clone, Copy)]
+enum At {
+    Linear {
+        number: u32,
+        place: [u32; 3],
+        size: u32,
+    },
+    Other(u32),
+    /// Between two cells without one: the face's axis, and whether the ray enters there.
+    Face {
+        axis: usize,
+        entering: bool,
+    },
+}
+
+/// A ray in units of the finest cells, turned towards high coordinates.
+struct Turned {
+    origin: [f64; 3],
+    direction: [f64; 3],
+    inverse: [f64; 3],
+    /// Axes that were turned, a bit each.
+    mask: usize,
+}
+
+impl Turned {
+    /// Parameter at which the ray meets a plane across an axis.
+    #[inline(always)]
+    fn at_plane(&self, axis: usize, plane: f64) -> f64 {
+        (plane - self.origin[axis]) * self.inverse[axis]
+    }
+
+    /// Coordinates from 0 to 1 in a cell, turned back.
+    #[inline(always)]
+    fn local(&self, t: f64, place: [u32; 3], size: [u32; 3]) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let at = (self.origin[axis] + self.direction[axis] * t - f64::from(place[axis])) / f64::from(size[axis]);
+            let at = at.clamp(0.0, 1.0);
+            if self.mask >> axis & 1 == 1 { 1.0 - at } else { at }
+        })
+    }
+}
+
+impl Caster {
+    /// The first place within `length` at which the ray, of unit direction, changes sides.
+    ///
+    /// A ray starts on the side of its origin, outside of the domain on the outside, and ends there where it leaves.
+    pub fn first(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> Option<Hit> {
+        let (found, start, begin) = self.find(origin, direction, length, method)?;
+        let t = begin + found.t;
+        if !(t <= length) {
+            return None;
+        }
+        let point = start + direction * found.t;
+        Some(Hit { distance: t, point, normal: self.normal(&found, point, direction) })
+    }
+
+    /// Whether the ray changes sides within `length`.
+    pub fn meets(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> bool {
+        self.find(origin, direction, length, method).is_some_and(|(found, _, begin)| begin + found.t <= length)
+    }
+
+    fn find(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> Option<(Found, DVec3, f64)> {
+        // Where the domain begins and ends.
+        let (low, high) = (self.extent.min, self.extent.max);
+        let (mut begin, mut end, mut axis_in) = (0.0, length, 3);
+        for axis in 0..3 {
+            let (near, far) = if direction[axis] < 0.0 { (high[axis], low[axis]) } else { (low[axis], high[axis]) };
+            if direction[axis] == 0.0 {
+                if origin[axis] < near || origin[axis] > far {
+                    return None;
+                }
+                continue;
+            }
+            let enter = (near - origin[axis]) / direction[axis];
+            if enter > begin {
+                (begin, axis_in) = (enter, axis);
+            }
+            end = end.min((far - origin[axis]) / direction[axis]);
+        }
+        if !(begin <= end) {
+            return None;
+        }
+        // From there on, so that far origins lose nothing.
+        let start = if axis_in < 3 { origin + direction * begin } else { origin };
+        let size = high - low;
+        let mut turned = Turned { origin: [0.0; 3], direction: [0.0; 3], inverse: [0.0; 3], mask: 0 };
+        for axis in 0..3 {
+            let scale = f64::from(FULL) / size[axis];
+            let (mut from, mut step) = ((start[axis] - low[axis]) * scale, direction[axis] * scale);
+            if step < 0.0 {
+                (from, step) = (f64::from(FULL) - from, -step);
+                turned.mask |= 1 << axis;
+            }
+            turned.origin[axis] = from.clamp(0.0, f64::from(FULL));
+            turned.direction[axis] = step;
+            turned.inverse[axis] = if step > 1.0 / STEEP { 1.0 / step } else { STEEP };
+        }
+        let outside = axis_in < 3;
+        let found = match (self.columns, method) {
+            (false, Method::Linear) => self.walk::<3, false>(&turned, outside, axis_in, length - begin),
+            (false, Method::Cubic) => self.walk::<3, true>(&turned, outside, axis_in, length - begin),
+            (true, Method::Linear) => self.walk::<2, false>(&turned, outside, axis_in, length - begin),
+            (true, Method::Cubic) => self.walk::<2, true>(&turned, outside, axis_in, length - begin),
+        }?;
+        Some((found, start, begin))
+    }
+
+    /// `AXES` are divided; `CUBIC` solves for the crossing of a trilinear leaf, else the way between its ends is a line.
+    #[inline(always)]
+    fn walk<const AXES: usize, const CUBIC: bool>(&self, ray: &Turned, outside: bool, axis_in: usize, length: f64) -> Option<Found> {
+        let mask = if AXES == 3 { ray.mask } else { ray.mask & 3 };
+        let mut stack = [0u32; MAX_DEPTH as usize + 1];
+        let mut place = [0u32; 3];
+        let mut size = FULL;
+        let mut word = self.root;
+        let mut t = 0.0;
+        // The value at the end of the last cell: infinite where only its side is known, not a number before the first.
+        let mut carried = if outside { f64::INFINITY } else { f64::NAN };
+        let mut axis_of_step = axis_in;
+        let mut last = None;
+        loop {
+            // Down to the leaf that holds the ray at t.
+            while let Child::Branch(node) = Child::of(word) {
+                stack[size.trailing_zeros() as usize] = node;
+                size >>= 1;
+                let mut octant = 0;
+                for axis in 0..AXES {
+                    let middle = place[axis] + size;
+                    if t >= ray.at_plane(axis, f64::from(middle)) {
+                        octant |= 1 << axis;
+                        place[axis] = middle;
+                    }
+                }
+                word = self.nodes[node as usize][octant ^ mask];
+            }
+            // Its end.
+            let sizes = if AXES == 3 { [size; 3] } else { [size, size, FULL] };
+            let ends: [f64; 3] = std::array::from_fn(|axis| ray.at_plane(axis, f64::from(place[axis] + sizes[axis])));
+            let axis_out = if ends[0] <= ends[1] {
+                if ends[0] <= ends[2] { 0 } else { 2 }
+            } else if ends[1] <= ends[2] {
+                1
+            } else {
+                2
+            };
+            let out = ends[axis_out].max(t);
+            match Child::of(word) {
+                Child::Empty(inside) => {
+                    if (carried < 0.0) != inside && !carried.is_nan() {
+                        let face = At::Face { axis: axis_of_step, entering: inside };
+                        return Some(Found { t, at: last.unwrap_or(face) });
+                    }
+                    (carried, last) = (if inside { f64::NEG_INFINITY } else { f64::INFINITY }, None);
+                }
+                Child::Linear(number) => {
+                    let corners = &self.corners[number as usize];
+                    let at = At::Linear { number, place, size };
+                    let value = |t: f64| trilinear(corners, ray.local(t, place, sizes)) - self.distance;
+                    if CUBIC {
+                        let step = (out - t) / 3.0;
+                        let values = [value(t), value(t + step), value(out - step), value(out)];
+                        if !carried.is_nan() && (carried < 0.0) != (values[0] < 0.0) {
+                            return Some(Found { t, at });
+                        }
+                        if let Some(part) = first_root(bernstein(values)) {
+                            return Some(Found { t: t + (out - t) * part, at });
+                        }
+                        carried = values[3];
+                    } else {
+                        let entry = if carried.is_finite() { carried } else { value(t) };
+                        if carried.is_infinite() && (carried < 0.0) != (entry < 0.0) {
+                            return Some(Found { t, at });
+                        }
+                        let exit = value(out);
+                        if (entry < 0.0) != (exit < 0.0) {
+                            return Some(Found { t: t + (out - t) * (entry / (entry - exit)).clamp(0.0, 1.0), at });
+                        }
+                        carried = exit;
+                    }
+                    last = Some(at);
+                }
+                Child::Other(number) => {
+                    let at = At::Other(number);
+                    let cell = self.field.find(self.others[number as usize])?;
+                    let extent = cell.extent();
+                    let value = |t: f64| {
+                        let local = ray.local(t, place, sizes);
+                        cell.value(extent.min + extent.size() * DVec3::from_array(local)) - self.distance
+                    };
+                    let entry = value(t);
+                    if !carried.is_nan() && (carried < 0.0) != (entry < 0.0) {
+                        return Some(Found { t, at });
+                    }
+                    if let Some(part) = first_change(|s| value(t + s), out - t, SLOPE, entry < 0.0) {
+                        return Some(Found { t: t + part, at });
+                    }
+                    (carried, last) = (value(out), Some(at));
+                }
+                Child::Branch(_) => return None,
+            }
+            // On to the next cell.
+            t = out;
+            if t > length {
+                return None;
+            }
+            let before = place[axis_out];
+            let after = before + sizes[axis_out];
+            if after >= FULL {
+                // The domain ends here, and with it the solid.
+                let face = At::Face { axis: axis_out, entering: false };
+                return (carried < 0.0).then_some(Found { t, at: face });
+            }
+            place[axis_out] = after;
+            axis_of_step = axis_out;
+            let level = 31 - (before ^ after).leading_zeros();
+            size = 1 << level;
+            let mut octant = 0;
+            for axis in 0..AXES {
+                octant |= ((place[axis] >> level & 1) as usize) << axis;
+                place[axis] &= !(size - 1);
+            }
+            word = self.nodes[stack[level as usize + 1] as usize][octant ^ mask];
+        }
+    }
+
+    fn normal(&self, found: &Found, point: DVec3, direction: DVec3) -> DVec3 {
+        let across = |axis: usize, entering: bool| {
+            let mut normal = DVec3::ZERO;
+            normal[axis.min(2)] = if (direction[axis.min(2)] > 0.0) == entering { -1.0 } else { 1.0 };
+            normal
+        };
+        let gradient = match found.at {
+            At::Face { axis, entering } => across(axis, entering),
+            At::Other(number) => self.field.find(self.others[number as usize]).map_or(DVec3::ZERO, |cell| cell.gradient(point)),
+            At::Linear { number, place, size } => self.slopes(number, place, size, point, direction),
+        };
+        gradient.try_normalize().unwrap_or(-direction)
+    }
+
+    /// Gradient in a trilinear leaf.
+    fn slopes(&self, number: u32, place: [u32; 3], size: u32, point: DVec3, direction: DVec3) -> DVec3 {
+        let corners = &self.corners[number as usize];
+        let whole = self.extent.size();
+        let mut local = [0.0; 3];
+        let mut edge = DVec3::ZERO;
+        for axis in 0..3 {
+            let undivided = self.columns && axis == 2;
+            let size = if undivided { FULL } else { size };
+            let turned = if undivided { 0 } else { place[axis] };
+            let low = if direction[axis] < 0.0 { FULL - turned - size } else { turned };
+            let part = whole[axis] / f64::from(FULL);
+            edge[axis] = part * f64::from(size);
+            local[axis] = ((point[axis] - self.extent.min[axis] - part * f64::from(low)) / edge[axis]).clamp(0.0, 1.0);
+        }
+        let slope = |axis: usize| {
+            let (mut low, mut high) = (local, local);
+            (low[axis], high[axis]) = (0.0, 1.0);
+            (trilinear(corners, high) - trilinear(corners, low)) / edge[axis]
+        };
+        DVec3::new(slope(0), slope(1), slope(2))
+    }
+}
