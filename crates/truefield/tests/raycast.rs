@@ -88,11 +88,12 @@ fn no_ray_leaks_through_cracks_of_random_trees() {
                 for _ in 0..samples {
                     let at = random.between(from.min(end), end);
                     // Cells are chosen by the bits of rounded places: along a face, either side may be meant.
-                    if (at - t).abs() > 1e-6 * (1.0 + far) && thick(&field, origin + direction * at, 1e-9 * (1.0 + far)) {
-                        if let Some(found) = side(at) {
-                            assert_eq!(found, first, "tree {round}, ray {i} from {origin} along {direction}: {at} before {t}");
-                            judged += 1;
-                        }
+                    if (at - t).abs() > 1e-6 * (1.0 + far)
+                        && thick(&field, origin + direction * at, 1e-9 * (1.0 + far))
+                        && let Some(found) = side(at)
+                    {
+                        assert_eq!(found, first, "tree {round}, ray {i} from {origin} along {direction}: {at} before {t}");
+                        judged += 1;
                     }
                 }
                 if t.is_finite() {
@@ -165,7 +166,7 @@ fn rays_meet_balls_boxes_and_rings_where_they_are() {
                 .collect();
             for method in METHODS {
                 let hits = cast(&caster, &rays, method);
-                let (mut wrong, mut worst) = (0, 0.0_f64);
+                let mut wrong = 0;
                 for (i, &(o, d)) in rays.iter().enumerate() {
                     match (hits[i].distance.is_finite(), truth(o, d)) {
                         (true, Some(t)) => {
@@ -178,14 +179,12 @@ fn rays_meet_balls_boxes_and_rings_where_they_are() {
                             let across = ((shape.value)(p + d * e) - (shape.value)(p - d * e)) / (2.0 * e);
                             if across.abs() > 0.3 {
                                 assert!(gap * across.abs() < 3.0 * tolerance, "{name} {method:?}: {gap} from the true hit");
-                                worst = worst.max(gap);
                             }
                         }
                         (false, None) => {}
                         _ => wrong += 1,
                     }
                 }
-                println!("{name} {:?} {method:?}: {wrong} grazing, {worst:.6}", rules.reconstruction);
                 assert!(wrong < rays.len() / 200, "{name} {method:?}: {wrong} grazing rays differ");
             }
         }
