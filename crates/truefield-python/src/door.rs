@@ -20,7 +20,16 @@ pub fn raise(error: Error) -> PyErr {
     match error {
         Error::Cancelled => PyKeyboardInterrupt::new_err("cancelled"),
         Error::Memory { .. } => PyMemoryError::new_err(error.to_string()),
-        Error::Invalid(_) | Error::Format(_) => python::TruefieldError::new_err(error.to_string()),
+        Error::Invalid(_) | Error::Format(_) => {
+            let sentence = error.to_string();
+            // What a function of the user raised is the cause of what is raised now.
+            Python::attach(|py| {
+                let cause = crate::implicit::cause(py, &sentence);
+                let raised = python::TruefieldError::new_err(sentence);
+                raised.set_cause(py, cause);
+                raised
+            })
+        }
     }
 }
 

@@ -9,6 +9,7 @@ mod convert;
 mod csg;
 mod door;
 mod field;
+mod implicit;
 mod marching;
 mod render;
 mod sampled;
@@ -27,6 +28,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<field::PyCompleteField>()?;
     module.add_class::<sampled::PySampledField>()?;
     module.add_class::<shape::PyShape>()?;
+    module.add_class::<implicit::PyExpression>()?;
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
@@ -44,6 +46,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(marching::wavefront_from, module)?)?;
     module.add_function(wrap_pyfunction!(marching::march_from, module)?)?;
     module.add_function(wrap_pyfunction!(marching::site_difference_of, module)?)?;
+    module.add_function(wrap_pyfunction!(implicit::function_shape, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     module.add_function(wrap_pyfunction!(csg::sphere, module)?)?;

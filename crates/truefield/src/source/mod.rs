@@ -2,6 +2,8 @@
 
 mod ask;
 pub mod csg;
+pub mod function;
+pub mod implicit;
 pub mod mesh;
 
 pub use ask::{bounds, gradients, values};

@@ -1,0 +1,220 @@
+//! The hierarchy of boxes that may hold surface.
+
+use super::sheet::{Content, Sheet, Side};
+use super::tape::Tape;
+use crate::error::{Error, Result};
+use crate::geom::{Aabb, DVec3, Interval};
+use crate::run::Run;
+
+/// Boxes that one thread takes at a time.
+const BLOCK: usize = 64;
+
+/// Levels of halving: at kinks and where sheets meet, the finest box is this fine.
+const LEVELS: u32 = 11;
+
+/// No level has more boxes; where it would, the boxes stay as they are.
+const MOST: usize = 1 << 20;
+
+/// Without children: a leaf.
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    pub extent: Aabb,
+    /// The first of its children, which follow each other.
+    pub first: u32,
+    pub count: u8,
+    /// How well the surface of a leaf is known; of an inner node, the worst of its leaves.
+    pub known: f32,
+    /// The number of its sheet.
+    pub sheet: Option<u32>,
+}
+
+/// All boxes of a domain that may hold surface, by halves.
+#[derive(Clone, Debug)]
+pub(super) struct Boxes {
+    pub nodes: Vec<Node>,
+    pub sheets: Vec<Sheet>,
+    /// Around all that is not outside.
+    pub solid: Aabb,
+    /// Whether some leaf has no sheet.
+    pub rough: bool,
+}
+
+/// What became of one box of a level.
+enum Fate {
+    Gone(Side),
+    Leaf(Option<Box<Sheet>>, f32),
+    Split,
+}
+
+impl Boxes {
+    /// Looks at the domain and all halves of what may hold surface, level by level.
+    pub(super) fn build(tape: &Tape, domain: &Aabb, run: &Run<'_>) -> Result<Self> {
+        let mut boxes = Self { nodes: vec![node(*domain)], sheets: Vec::new(), solid: Aabb::EMPTY, rough: false };
+        let mut level = 0..1;
+        for depth in 0..=LEVELS {
+            let cells: Vec<Aabb> = boxes.nodes[level.clone()].iter().map(|node| node.extent).collect();
+            let fates = run.blocks("boxes", cells.len().div_ceil(BLOCK), |block| {
+                let part = &cells[block * BLOCK..cells.len().min((block + 1) * BLOCK)];
+                Ok(part.iter().map(|cell| fate(tape, domain, cell)).collect::<Vec<_>>())
+            })?;
+            let fates: Vec<Fate> = fates.into_iter().flatten().collect();
+            let open = fates.iter().filter(|fate| matches!(fate, Fate::Split)).count();
+            let last = depth == LEVELS || open * 8 > MOST;
+            let start = boxes.nodes.len();
+            for (index, fate) in level.clone().zip(fates) {
+                let extent = boxes.nodes[index].extent;
+                let fate = if last && matches!(fate, Fate::Split) { Fate::Leaf(None, crossed(tape, &extent)) } else { fate };
+                match fate {
+                    Fate::Gone(Side::Outside) => boxes.nodes[index].known = f32::NAN,
+                    Fate::Gone(Side::Inside) => {
+                        boxes.nodes[index].known = f32::NAN;
+                        boxes.solid = boxes.solid.union(extent);
+                    }
+                    Fate::Leaf(sheet, known) => {
+                        boxes.solid = boxes.solid.union(extent);
+                        boxes.rough |= sheet.is_none();
+                        boxes.nodes[index].known = known;
+                        boxes.nodes[index].sheet = sheet.map(|sheet| {
+                            boxes.sheets.push(*sheet);
+                            (boxes.sheets.len() - 1) as u32
+                        });
+                    }
+                    Fate::Split => {
+                        boxes.nodes[index].first = boxes.nodes.len() as u32;
+                        let before = boxes.nodes.len();
+                        boxes.nodes.extend(halves(&extent).into_iter().map(node));
+                        boxes.nodes[index].count = (boxes.nodes.len() - before) as u8;
+                    }
+                }
+            }
+            level = start..boxes.nodes.len();
+            if level.is_empty() {
+                break;
+            }
+        }
+        boxes.tidy();
+        Ok(boxes)
+    }
+
+    /// Drops boxes without surface, and says of inner nodes how well their worst leaf is known.
+    fn tidy(&mut self) {
+        for index in (0..self.nodes.len()).rev() {
+            let Node { first, count, .. } = self.nodes[index];
+            if count > 0 {
+                let children = first as usize..first as usize + usize::from(count);
+                let worst = self.nodes[children].iter().map(|child| child.known).fold(f32::NAN, f32::max);
+                self.nodes[index].known = worst;
+            }
+        }
+        let old = std::mem::take(&mut self.nodes);
+        let mut pending = std::collections::VecDeque::new();
+        if !old[0].known.is_nan() {
+            self.nodes.push(old[0].clone());
+            pending.push_back(0);
+        }
+        while let Some(index) = pending.pop_front() {
+            let Node { first, count, .. } = self.nodes[index];
+            let start = self.nodes.len();
+            for child in &old[first as usize..first as usize + usize::from(count)] {
+                if !child.known.is_nan() {
+                    pending.push_back(self.nodes.len());
+                    self.nodes.push(child.clone());
+                }
+            }
+            self.nodes[index].first = start as u32;
+            self.nodes[index].count = (self.nodes.len() - start) as u8;
+        }
+    }
+
+    /// Refuses a domain without surface.
+    pub(super) fn checked(self, tape: &Tape, domain: &Aabb) -> Result<Self> {
+        if self.nodes.is_empty() && self.solid == Aabb::EMPTY {
+            let middle = tape.value(domain.center());
+            return Err(Error::invalid(format!(
+                "the expression is positive in all of the domain ({middle:.3} in its middle), so it has no inside there; \
+                 give a domain around the shape"
+            )));
+        }
+        Ok(self)
+    }
+
+    /// How well the surface near `cell` is known: the worst of the leaves that are not farther from it than `reach`.
+    pub(super) fn known_near(&self, cell: &Aabb, reach: f64) -> f64 {
+        let mut worst = 0.0_f32;
+        let mut pending = vec![0_usize];
+        while let Some(index) = pending.pop() {
+            let Some(node) = self.nodes.get(index) else { continue };
+            let apart = (node.extent.min - cell.max).max(cell.min - node.extent.max).max(DVec3::ZERO).length();
+            if apart > reach || node.known <= worst {
+                continue;
+            }
+            if node.count == 0 {
+                worst = node.known;
+            }
+            pending.extend((0..usize::from(node.count)).map(|child| node.first as usize + child));
+        }
+        f64::from(worst)
+    }
+}
+
+fn node(extent: Aabb) -> Node {
+    Node { extent, first: 0, count: 0, known: 0.0, sheet: None }
+}
+
+fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
+    match Content::of(tape, domain, cell) {
+        Content::Nothing(side) => Fate::Gone(side),
+        Content::Sheet(sheet) => {
+            let known = if sound(&sheet, domain) { 0.0 } else { crossed(tape, &sheet.reach) };
+            Fate::Leaf(Some(sheet), known)
+        }
+        Content::Open => Fate::Split,
+    }
+}
+
+/// Whether any part of the sheet that cannot be told from surface is next to surface within the domain: along the faces
+/// of the domain that it touches, the formula still grows in one direction.
+fn sound(sheet: &Sheet, domain: &Aabb) -> bool {
+    let mut inner = sheet.gradient;
+    for axis in 0..3 {
+        if sheet.reach.min[axis] <= domain.min[axis] || sheet.reach.max[axis] >= domain.max[axis] {
+            inner[axis] = Interval::exact(0.0);
+        }
+    }
+    let (along, spread) = super::matrix::middle_of(&inner);
+    let (whole, _) = super::matrix::middle_of(&sheet.gradient);
+    along.length() - spread > 0.1 * whole.length()
+}
+
+/// No less than how far the surface is from any point of a box: its diagonal, where its corners are certainly not all on
+/// one side; infinite where they may be.
+fn crossed(tape: &Tape, cell: &Aabb) -> f32 {
+    let (mut inside, mut outside) = (false, false);
+    for p in (0..8).map(|corner| cell.corner(corner)).chain([cell.center()]) {
+        match Side::of(tape.certain(p)) {
+            Some(Side::Inside) => inside = true,
+            Some(Side::Outside) => outside = true,
+            None => {}
+        }
+    }
+    if inside && outside { (cell.diagonal() as f32).next_up() } else { f32::INFINITY }
+}
+
+/// A box cut across its longer edges, in two, four or eight.
+pub(super) fn halves(cell: &Aabb) -> Vec<Aabb> {
+    let (size, center) = (cell.size(), cell.center());
+    let mut parts = vec![*cell];
+    for axis in 0..3 {
+        if size[axis] < 0.6 * size.max_element() {
+            continue;
+        }
+        let before = parts.len();
+        for index in 0..before {
+            let mut upper = parts[index];
+            parts[index].max[axis] = center[axis];
+            upper.min[axis] = center[axis];
+            parts.push(upper);
+        }
+    }
+    parts
+}

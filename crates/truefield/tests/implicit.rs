@@ -1,0 +1,294 @@
+//! Shapes from formulas: the true distance, against shapes whose distance is known and against brute force.
+
+use std::f64::consts::PI;
+
+use truefield::laws::{Random, check_distance, check_lipschitz, check_threads};
+use truefield::source::implicit::{Expression, Implicit, Unary};
+use truefield::{Aabb, DVec3, Distance, Interval, Run, Source};
+
+fn axes() -> [Expression; 3] {
+    Expression::axes()
+}
+
+fn square(e: &Expression) -> Expression {
+    e.unary(Unary::Square)
+}
+
+fn cube(half: f64) -> Aabb {
+    Aabb::new(DVec3::splat(-half), DVec3::splat(half))
+}
+
+fn shape(expression: &Expression, domain: Aabb) -> Implicit {
+    Implicit::new(expression, domain, &Run::with_threads(2)).expect("a shape")
+}
+
+fn value(shape: &Implicit, p: DVec3) -> f64 {
+    let mut out = [0.0];
+    shape.values(&[p], &mut out).expect("a value");
+    out[0]
+}
+
+/// A ball of radius 1, whose formula is not its distance.
+fn ball() -> Expression {
+    let [x, y, z] = axes();
+    square(&x) + square(&y) + square(&z) - 1.0
+}
+
+fn torus(major: f64, minor: f64) -> Expression {
+    let [x, y, z] = axes();
+    let ring = (square(&x) + square(&y)).unary(Unary::SquareRoot) - major;
+    square(&ring) + square(&z) - minor * minor
+}
+
+fn gyroid() -> Expression {
+    let [x, y, z] = axes();
+    let wave = |a: &Expression, b: &Expression| &a.unary(Unary::Sine) * &b.unary(Unary::Cosine);
+    wave(&x, &y) + wave(&y, &z) + wave(&z, &x)
+}
+
+fn points(random: &mut Random, within: &Aabb, count: usize) -> Vec<DVec3> {
+    (0..count).map(|_| random.within(within)).collect()
+}
+
+/// How wide the widest interval is, and whether it and the value are right.
+fn compare(shape: &Implicit, judge: impl Fn(DVec3) -> f64, points: &[DVec3]) -> f64 {
+    let mut widest = 0.0_f64;
+    for &p in points {
+        let (at, truth) = (shape.at(p), judge(p));
+        let rounding = 1e-14 * (1.0 + p.length());
+        assert!(at.widen(rounding).contains(truth), "{at:?} at {p} does not hold {truth:?}");
+        let value = value(shape, p);
+        assert!(at.widen(rounding).contains(value), "{at:?} at {p} does not hold the value {value:?}");
+        assert!((value - truth).abs() <= shape.noise() + rounding, "{value:?} at {p} is not {truth:?}");
+        widest = widest.max(at.width());
+    }
+    widest
+}
+
+#[test]
+fn a_ball_has_the_distance_of_a_ball() {
+    let ball = shape(&ball(), cube(1.5));
+    let mut random = Random::new(1);
+    let mut places = points(&mut random, &cube(1.5), 3000);
+    places.extend(points(&mut random, &cube(40.0), 500));
+    places.extend((0..500).map(|_| random.direction() * (1.0 + random.between(-1.0, 1.0) * random.length(1e-16, 1e-1))));
+    let judge = |p: DVec3| p.length() - 1.0;
+    let widest = compare(&ball, judge, &places);
+    assert!(widest < 1e-9, "an interval is {widest} wide");
+    check_distance(&ball, judge, &places[..400], 1e-13).unwrap_or_else(|broken| panic!("{broken}"));
+    // The middle is as far from everything.
+    let middle = ball.at(DVec3::ZERO);
+    assert!(middle.contains(-1.0) && middle.width() < 1e-9, "{middle:?}");
+    let extent = ball.extent().expect("an extent");
+    assert!(extent.contains(DVec3::NEG_ONE) && extent.contains(DVec3::ONE) && extent.size().max_element() < 2.4, "{extent:?}");
+}
+
+#[test]
+fn a_torus_has_the_distance_of_a_torus() {
+    let torus = shape(&torus(1.0, 0.4), cube(1.7));
+    let mut random = Random::new(2);
+    let judge = |p: DVec3| DVec3::new(p.x.hypot(p.y) - 1.0, p.z, 0.0).length() - 0.4;
+    let widest = compare(&torus, judge, &points(&mut random, &cube(1.7), 3000));
+    assert!(widest < 1e-9, "an interval is {widest} wide");
+}
+
+/// The distance to a surface, by Newton's method from all samples next to it.
+struct Samples {
+    points: Vec<DVec3>,
+    spacing: f64,
+}
+
+impl Samples {
+    /// Points of the gyroid, with a hundredth between neighbours.
+    fn of_gyroid(domain: &Aabb) -> Self {
+        let steps = 160;
+        let spacing = domain.size().x / f64::from(steps);
+        let gradient = |p: DVec3| {
+            let (s, c) = (DVec3::new(p.x.sin(), p.y.sin(), p.z.sin()), DVec3::new(p.x.cos(), p.y.cos(), p.z.cos()));
+            let value = s.x * c.y + s.y * c.z + s.z * c.x;
+            (value, DVec3::new(c.x * c.y - s.z * s.x, c.y * c.z - s.x * s.y, c.z * c.x - s.y * s.z))
+        };
+        let mut points = Vec::new();
+        for i in 0..steps * steps * steps {
+            let cell = DVec3::new(f64::from(i % steps), f64::from(i / steps % steps), f64::from(i / steps / steps));
+            let mut p = domain.min + (cell + 0.5) * spacing;
+            let (value, slope) = gradient(p);
+            if value.abs() > slope.length() * spacing {
+                continue;
+            }
+            for _ in 0..6 {
+                let (value, slope) = gradient(p);
+                p -= slope * (value / slope.length_squared());
+            }
+            if domain.contains(p) && gradient(p).0.abs() < 1e-13 {
+                points.push(p);
+            }
+        }
+        Self { points, spacing }
+    }
+
+    fn nearest(&self, p: DVec3) -> f64 {
+        self.points.iter().map(|q| (*q - p).length_squared()).fold(f64::INFINITY, f64::min).sqrt()
+    }
+}
+
+#[test]
+fn a_gyroid_is_as_far_as_its_nearest_sample() {
+    // Not a whole number of waves, where the surface would run through the corners.
+    let domain = cube(3.0);
+    let gyroid = shape(&gyroid(), domain);
+    let samples = Samples::of_gyroid(&domain);
+    let mut random = Random::new(3);
+    let mut widest = 0.0_f64;
+    for p in points(&mut random, &domain, 400) {
+        let at = gyroid.at(p);
+        let faces = (p - domain.min).min(domain.max - p).min_element();
+        let nearest = samples.nearest(p);
+        // Inside, the faces of the domain are surface too.
+        let truth = if at.upper < 0.0 { nearest.min(faces) } else { nearest };
+        let size = Interval { lower: at.lower.abs().min(at.upper.abs()), upper: at.lower.abs().max(at.upper.abs()) };
+        // Samples are no nearer than the surface, and farther by what lies between them.
+        assert!(size.lower <= truth + 1e-12, "{at:?} at {p}, but a sample is {truth} away");
+        assert!(size.upper >= truth - samples.spacing, "{at:?} at {p}, but the nearest sample is {truth} away");
+        widest = widest.max(at.width());
+    }
+    assert!(widest < 1e-8, "an interval is {widest} wide");
+    check_lipschitz(&gyroid, &points(&mut random, &domain.grow(1.0), 1500), 1e-12).unwrap_or_else(|broken| panic!("{broken}"));
+}
+
+#[test]
+fn the_domain_bounds_the_solid() {
+    // A half space in a box is a smaller box.
+    let [x, y, z] = axes();
+    let plane = shape(&(x.clone() + 0.0), cube(1.0));
+    let half = Aabb::new(DVec3::NEG_ONE, DVec3::new(0.0, 1.0, 1.0));
+    let judge = move |p: DVec3| {
+        let out = half.distance_squared(p).sqrt();
+        if out > 0.0 { out } else { -(p - half.min).min(half.max - p).min_element() }
+    };
+    let mut random = Random::new(4);
+    let widest = compare(&plane, judge, &points(&mut random, &cube(3.0), 3000));
+    assert!(widest < 1e-8, "an interval is {widest} wide");
+    let extent = plane.extent().expect("an extent");
+    assert!(extent.contains(half.min) && extent.contains(half.max));
+    // A tilted one meets faces, edges and a corner: the nearest point is often on the rim.
+    let tilted = shape(&(&(&x + &y) + &z), cube(1.0));
+    let normal = DVec3::ONE / 3.0_f64.sqrt();
+    let solid = move |p: DVec3| {
+        // Dykstra's alternating projections onto the box and the half space.
+        let (mut at, mut box_part, mut plane_part) = (p, DVec3::ZERO, DVec3::ZERO);
+        for _ in 0..4000 {
+            let before = at;
+            let onto = (at + box_part).clamp(DVec3::NEG_ONE, DVec3::ONE);
+            box_part = at + box_part - onto;
+            let moved = onto + plane_part;
+            at = moved - normal * moved.dot(normal).max(0.0);
+            plane_part = moved - at;
+            if (at - before).length() < 1e-15 && (onto - at).length() < 1e-15 {
+                break;
+            }
+        }
+        at
+    };
+    for p in points(&mut random, &cube(2.5), 600) {
+        let inside = cube(1.0).contains(p) && p.dot(normal) < 0.0;
+        let truth = if inside { p.dot(normal).max(-(1.0 - p.abs().max_element())) } else { (solid(p) - p).length() };
+        let at = tilted.at(p);
+        assert!(at.widen(1e-9).contains(truth), "{at:?} at {p} is not {truth}");
+        assert!(at.width() < 1e-6, "{at:?} at {p} is wide");
+    }
+}
+
+#[test]
+fn kinks_and_poles_and_cusps_stay_honest() {
+    let [x, y, z] = axes();
+    let mut random = Random::new(5);
+    // A box by maxima: edges and corners.
+    let half = |e: &Expression, h: f64| e.unary(Unary::Absolute) - h;
+    let max = |a: Expression, b: Expression| a.binary(truefield::source::implicit::Binary::Maximum, &b);
+    let block = shape(&max(max(half(&x, 0.5), half(&y, 0.3)), half(&z, 0.2)), cube(1.0));
+    let judge = |p: DVec3| {
+        let q = p.abs() - DVec3::new(0.5, 0.3, 0.2);
+        q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
+    };
+    let widest = compare(&block, judge, &points(&mut random, &cube(1.0), 60));
+    assert!(widest <= 2.0 * block.noise(), "an interval is {widest} wide");
+    // Signs change through a pole as well: 1 / x is negative on the left.
+    let pole = shape(&(&Expression::constant(1.0) / &x), cube(1.0));
+    for p in points(&mut random, &cube(0.9), 60) {
+        let truth = if p.x > 0.0 { p.x } else { p.x.max(-(1.0 - p.abs().max_element())) };
+        let at = pole.at(p);
+        assert!(at.contains(truth) && at.width() < 1e-3, "{at:?} at {p} is not {truth}");
+    }
+    // A sheet that touches zero without crossing cannot be told from none: the interval says so.
+    let touching = shape(&(square(&x) * (&x + &y) + 0.0), cube(1.0));
+    for p in points(&mut random, &cube(0.9), 20) {
+        let at = touching.at(p);
+        let (sheet, cross) = (p.x.abs(), ((p.x + p.y) / 2.0_f64.sqrt()).abs());
+        assert!(at.lower.abs().min(at.upper.abs()) <= cross + 1e-9 && at.lower <= at.upper, "{at:?} at {p}, {sheet} and {cross}");
+    }
+}
+
+#[test]
+fn what_is_no_shape_is_refused() {
+    let run = Run::with_threads(1);
+    let refused = |e: &Expression, domain: Aabb| Implicit::new(e, domain, &run).expect_err("a refusal").to_string();
+    assert!(refused(&(ball() + 5.0), cube(1.0)).contains("positive"), "no inside");
+    assert!(refused(&ball(), Aabb::new(DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0))).contains("domain"), "flat");
+    assert!(refused(&ball(), Aabb::new(DVec3::ZERO, DVec3::splat(f64::INFINITY))).contains("finite"), "endless");
+    assert!(refused(&(ball() + f64::NAN), cube(1.0)).contains("finite"), "not a number");
+    // Where a root is not defined, the shape cannot be asked, and says where.
+    let [x, ..] = axes();
+    let root = shape(&(x.unary(Unary::SquareRoot) - 0.5), cube(1.0));
+    let failure = root.values(&[DVec3::new(-0.5, 0.0, 0.0)], &mut [0.0]).expect_err("undefined").to_string();
+    assert!(failure.contains("not a number"), "{failure}");
+    assert!(root.at(DVec3::new(-0.5, 0.0, 0.0)).contains(0.5), "nothing is promised there");
+    // All of the domain is a box.
+    let full = shape(&(ball() - 100.0), cube(1.0));
+    assert!(full.at(DVec3::ZERO).contains(-1.0) && full.at(DVec3::new(3.0, 0.0, 0.0)).contains(2.0));
+}
+
+#[test]
+fn bends_hold_second_differences_and_slack_holds_the_rest() {
+    let mut random = Random::new(6);
+    let domain = cube(1.7);
+    let wavy = gyroid();
+    let shapes = [(shape(&ball(), cube(1.5)), 1.4), (shape(&torus(1.0, 0.4), domain), 1.6), (shape(&wavy, cube(PI)), 2.8)];
+    for (shape, size) in &shapes {
+        let (mut finite, mut count) = (0, 0);
+        for _ in 0..300 {
+            let middle = random.within(&cube(*size));
+            let half = random.length(1e-3, 0.1);
+            let cell = Aabb::new(middle - half, middle + half);
+            let (bend, slack) = (shape.bend(&cell), shape.slack(&cell));
+            assert!(bend.lower <= bend.upper);
+            count += 1;
+            finite += usize::from(bend.width().is_finite());
+            for _ in 0..4 {
+                let (p, direction) = (random.within(&cell), random.direction());
+                let step = 0.2 * half;
+                let ends = [p - direction * step, p, p + direction * step];
+                let [a, b, c] = ends.map(|q| value(shape, q));
+                assert!(slack.widen(1e-15).contains(shape.at(p).lower - b) && slack.widen(1e-15).contains(shape.at(p).upper - b));
+                if !ends.iter().all(|&q| cell.contains(q)) {
+                    continue;
+                }
+                let second = (a - 2.0 * b + c) / (step * step);
+                let rounding = 4.0 * shape.noise() / (step * step);
+                assert!(bend.widen(rounding).contains(second), "{second} at {p} over {cell:?}, {bend:?}");
+            }
+        }
+        assert!(finite * 8 > count, "only {finite} of {count} cells are known to be smooth");
+    }
+}
+
+#[test]
+fn building_does_not_depend_on_threads() {
+    let mut random = Random::new(7);
+    let places = points(&mut random, &cube(3.0), 50);
+    check_threads("implicit", |run| {
+        let gyroid = Implicit::new(&gyroid(), cube(PI), run)?;
+        Ok(places.iter().map(|&p| (gyroid.at(p).lower.to_bits(), gyroid.at(p).upper.to_bits())).collect::<Vec<_>>())
+    })
+    .unwrap_or_else(|broken| panic!("{broken}"));
+}
