@@ -1,6 +1,6 @@
 """Distance fields that people can trust: every distance comes with an interval that contains the truth."""
 
-from truefield import csg, shapes
+from truefield import csg, implicit, shapes
 from truefield._truefield import __version__
 from truefield.check import MeshCheck
 from truefield.cloud import PointCloud
@@ -37,6 +37,7 @@ __all__ = [
     "complete_field",
     "csg",
     "distance_transform",
+    "implicit",
     "load",
     "read",
     "read_points",

@@ -159,12 +159,7 @@ impl Callback for PyFunction {
 
 /// A vectorised function of (n, 3) points as a shape; `values` is "bound" or "distance".
 #[pyfunction]
-pub fn function_shape(
-    function: Py<PyAny>,
-    lipschitz: f64,
-    domain: Option<([f64; 3], [f64; 3])>,
-    values: &str,
-) -> PyResult<PyShape> {
+pub fn function_shape(function: Py<PyAny>, lipschitz: f64, domain: Option<([f64; 3], [f64; 3])>, values: &str) -> PyResult<PyShape> {
     let meaning = match values {
         "bound" => Meaning::Bound,
         "distance" => Meaning::Distance,

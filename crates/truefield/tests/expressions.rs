@@ -18,15 +18,8 @@ const UNARY: [Unary; 11] = [
     Unary::Floor,
 ];
 
-const BINARY: [Binary; 7] = [
-    Binary::Add,
-    Binary::Subtract,
-    Binary::Multiply,
-    Binary::Divide,
-    Binary::Minimum,
-    Binary::Maximum,
-    Binary::ArcTangent2,
-];
+const BINARY: [Binary; 7] =
+    [Binary::Add, Binary::Subtract, Binary::Multiply, Binary::Divide, Binary::Minimum, Binary::Maximum, Binary::ArcTangent2];
 
 fn tape(expression: &Expression) -> Tape {
     Tape::new(expression).expect("a formula")

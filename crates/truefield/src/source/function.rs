@@ -130,15 +130,13 @@ impl<C: Callback> Function<C> {
         };
         let mut own = vec![0.0; points.len()];
         let asked = self.ask(&inner, &mut own).and_then(|()| match self.domain {
-            Some(_) if self.meaning == Meaning::Distance => {
-                match (0..points.len()).find(|&i| own[i] < 0.0 && points[i] != inner[i]) {
-                    Some(index) => Err(Error::invalid(format!(
-                        "the function is negative at {}, on a face of the domain; give a domain that holds the shape, or values=\"bound\"",
-                        inner[index]
-                    ))),
-                    None => Ok(()),
-                }
-            }
+            Some(_) if self.meaning == Meaning::Distance => match (0..points.len()).find(|&i| own[i] < 0.0 && points[i] != inner[i]) {
+                Some(index) => Err(Error::invalid(format!(
+                    "the function is negative at {}, on a face of the domain; give a domain that holds the shape, or values=\"bound\"",
+                    inner[index]
+                ))),
+                None => Ok(()),
+            },
             _ => Ok(()),
         });
         if let Err(error) = asked {

@@ -241,7 +241,10 @@ impl<'a> Search<'a> {
                 self.foot = Some(foot.point);
             }
         }
-        if !foot.is_held(&sheet.reach, self.domain) && far <= self.upper && self.feet.iter().all(|known| (*known - foot.point).length() > self.accuracy.smooth) {
+        if !foot.is_held(&sheet.reach, self.domain)
+            && far <= self.upper
+            && self.feet.iter().all(|known| (*known - foot.point).length() > self.accuracy.smooth)
+        {
             self.feet.push(foot.point);
             // The wider the box around the foot, the more is proven at once; the smaller, the less derivatives differ.
             let mut half = WIDE * extent.size().max_element();
