@@ -2,7 +2,6 @@ import threading
 
 import numpy as np
 import pytest
-
 import truefield as tf
 from truefield import csg, implicit
 
@@ -90,7 +89,8 @@ def test_wrong_expressions_are_refused() -> None:
 
 
 def distance_of_a_ball(p: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(p, axis=1) - 1
+    distance: np.ndarray = np.linalg.norm(p, axis=1) - 1
+    return distance
 
 
 def test_a_function_is_asked_in_numpy() -> None:
@@ -117,12 +117,12 @@ def test_a_function_is_asked_in_numpy() -> None:
 
 
 def test_an_exception_reaches_the_user_with_its_cause() -> None:
-    def broken(p: np.ndarray) -> np.ndarray:
+    def broken(_: np.ndarray) -> np.ndarray:
         raise KeyError("no such part")
 
     shape = implicit.function(broken, domain=BOX)
     for _ in range(2):
-        with pytest.raises(tf.TruefieldError, match="KeyError.*no such part") as caught:
+        with pytest.raises(tf.TruefieldError, match=r"KeyError.*no such part") as caught:
             shape.distance(places(10))
         assert isinstance(caught.value.__cause__, KeyError)
 
@@ -131,10 +131,10 @@ def test_an_exception_reaches_the_user_with_its_cause() -> None:
     ("function", "words"),
     [
         (lambda p: p, r"shape \[10, 3\]"),
-        (lambda p: 1.0, "shape"),
+        (lambda _: 1.0, "shape"),
         (lambda p: p[:-1, 0], "shape"),
         (lambda p: np.where(p[:, 0] > 0, np.nan, 1.0), "not a number"),
-        (lambda p: None, "TypeError|shape|not a number"),
+        (lambda _: None, "TypeError|shape|not a number"),
         (lambda p: ["a"] * len(p), "ValueError"),
         (lambda p: 3 * distance_of_a_ball(p), "lipschitz"),
         (lambda: 1, "TypeError"),
@@ -154,7 +154,7 @@ def test_a_shape_that_reaches_out_of_its_domain_is_found_out() -> None:
 def test_arguments_of_functions_are_checked() -> None:
     for arguments in ({"lipschitz": 0}, {"lipschitz": float("nan")}, {"values": "exact"}, {"domain": 3}):
         with pytest.raises(tf.TruefieldError):
-            implicit.function(distance_of_a_ball, **arguments)  # type: ignore[arg-type]
+            implicit.function(distance_of_a_ball, **arguments)
     with pytest.raises(tf.TruefieldError, match="called"):
         implicit.function(3)  # type: ignore[arg-type]
 

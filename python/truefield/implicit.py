@@ -7,8 +7,8 @@
 ...     domain=((0, 0, 0), (6.2, 6.2, 6.2)),
 ... )
 
-A formula's values are no distances: `field` finds the true distance to where it vanishes, with proof. A function written in
-Python cannot be looked into: what `function` knows is how fast it changes.
+A formula's values are no distances: `field` finds the true distance to where it vanishes, with proof. A function written
+in Python cannot be looked into: what `function` knows is how fast it changes.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Expression:
         if isinstance(exponent, Expression):
             return exp(exponent * log(self))
         power = float(exponent)
-        if power == int(power) if math.isfinite(power) else False:
+        if math.isfinite(power) and power == int(power):
             if abs(power) > 1000:
                 raise TruefieldError(f"the exponent is {exponent}; give one between -1000 and 1000")
             return Expression(self._native.power(int(power)))
@@ -213,8 +213,8 @@ def field(
 
     Args:
         expression: a formula of `axes()`; its own values need not be distances.
-        domain: lowest and highest corner. The box bounds the solid: where the formula is negative on a face, the face is
-            surface. The formula is not asked outside.
+        domain: lowest and highest corner. The box bounds the solid: where the formula is negative on a face, the face
+            is surface. The formula is not asked outside.
         threads: number of threads; all cores by default.
         progress: called as `progress(phase, fraction)`.
 
@@ -225,8 +225,8 @@ def field(
     through a pole counts as surface.
 
     Raises:
-        TruefieldError: the domain is no finite box, or the formula is positive in all of it; when asked, the formula is not
-            defined at a point of the domain.
+        TruefieldError: the domain is no finite box, or the formula is positive in all of it; when asked, the formula is
+            not defined at a point of the domain.
     """
     if not isinstance(expression, Expression):
         raise TruefieldError(f"the expression is {expression!r}; make one from implicit.axes()")
@@ -236,7 +236,7 @@ def field(
 
 
 def function(
-    callable: Callable[[Floats], NDArray[np.float64]],
+    compute: Callable[[Floats], NDArray[np.float64]],
     lipschitz: float = 1.0,
     domain: Box | None = None,
     *,
@@ -245,27 +245,28 @@ def function(
     """The solid where a function of yours is negative.
 
     Args:
-        callable: takes points (n, 3) float64 and answers (n,) numbers. It is called on other threads, one call at a time.
-        lipschitz: the function changes by no more than this times the way that one moves. Values are divided by it. Neighbours
-            in the order of points that contradict it are an error.
+        compute: takes points (n, 3) float64 and answers (n,) numbers. It is called on other threads.
+        lipschitz: the function changes by no more than this times the way that one moves. Values are divided by it.
+            Neighbours in the order of points that contradict it are an error.
         domain: lowest and highest corner of the box in which it may be asked, which also bounds the solid; without,
             it is asked anywhere and the solid has no extent.
         values: "bound": the distance is at least value / lipschitz, which is all that `bounds` promises. "distance":
             value / lipschitz is the distance, and the solid lies inside the domain.
 
     Raises:
-        TruefieldError: the arguments make no sense; when asked, the function raised (the cause is its own exception), did not
-            answer one number for each point, or changes faster than stated. A function that failed is not asked again.
+        TruefieldError: the arguments make no sense; when asked, the function raised (the cause is its own exception),
+            did not answer one number for each point, or changes faster than stated. A function that failed is not
+            asked again.
     """
-    if not hasattr(callable, "__call__"):
-        raise TruefieldError(f"the function is {callable!r}; give something that can be called with points")
+    if not callable(compute):
+        raise TruefieldError(f"the function is {compute!r}; give something that can be called with points")
     native = _truefield.function_shape(
-        callable,
+        compute,
         arguments.length("lipschitz", lipschitz),
         None if domain is None else _box(domain),
         values,
     )
-    return Shape(native, f"implicit.function({getattr(callable, '__name__', 'callable')}, lipschitz={lipschitz:g})")
+    return Shape(native, f"implicit.function({getattr(compute, '__name__', 'compute')}, lipschitz={lipschitz:g})")
 
 
 def _expression(value: Expression | Number) -> Expression:

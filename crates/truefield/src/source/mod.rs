@@ -5,5 +5,6 @@ pub mod csg;
 pub mod function;
 pub mod implicit;
 pub mod mesh;
+pub mod patch;
 
 pub use ask::{bounds, gradients, values};
