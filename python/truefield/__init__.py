@@ -2,8 +2,10 @@
 
 from truefield import csg, implicit, shapes
 from truefield._truefield import __version__
+from truefield.adaptive import AdaptiveField, RayHits, adaptive_field
 from truefield.check import MeshCheck
 from truefield.cloud import PointCloud
+from truefield.collision import Collision, collide
 from truefield.errors import FileError, TruefieldError
 from truefield.fields import CompleteField, SignRule, Surface, complete_field
 from truefield.io import read, read_points
@@ -18,12 +20,15 @@ from truefield.transform import DistanceTransform, distance_transform, voronoi
 from truefield.volume import Volume, read_volume
 
 __all__ = [
+    "AdaptiveField",
+    "Collision",
     "CompleteField",
     "DistanceTransform",
     "FileError",
     "MeshCheck",
     "Nearest",
     "PointCloud",
+    "RayHits",
     "SampledField",
     "Shape",
     "SignRule",
@@ -34,6 +39,8 @@ __all__ = [
     "Volume",
     "Voxels",
     "__version__",
+    "adaptive_field",
+    "collide",
     "complete_field",
     "csg",
     "distance_transform",

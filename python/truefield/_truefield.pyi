@@ -1,7 +1,7 @@
 """The compiled half of truefield."""
 
 from collections.abc import Callable
-from typing import Any, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ _Progress = Callable[[str, float], None] | None
 _NearestArrays = tuple[_Floats, _Floats, NDArray[np.int64], NDArray[np.uint8], _Floats]
 
 __all__ = [
+    "AdaptiveField",
     "Camera",
     "CompleteField",
     "SampledField",
@@ -18,19 +19,25 @@ __all__ = [
     "Shape",
     "Surface",
     "__version__",
+    "adaptive_surface",
+    "cast_rays",
     "check_mesh",
+    "collide",
     "complete_field_from_parts",
     "complete_field_parts",
     "contour",
     "cuboid",
     "distance_transform",
     "march",
+    "occluded_rays",
+    "render_field",
     "sample",
     "sample_marched",
     "site_difference",
     "site_indices",
     "skewed_bounds",
     "skewed_transform",
+    "solid_extent",
     "sphere",
     "thickness",
     "transform_bounds",
@@ -411,3 +418,81 @@ class Shape:
 
 def sphere(radius: float, center: list[float]) -> Shape: ...
 def cuboid(size: list[float], radius: float, center: list[float]) -> Shape: ...
+
+@final
+class AdaptiveField:
+    def __new__(
+        cls,
+        shape: Shape,
+        tolerance: float,
+        growth: float,
+        max_depth: int,
+        domain: tuple[list[float], list[float]] | None,
+        method: str,
+        rule: str,
+        memory: int,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> AdaptiveField: ...
+    @property
+    def extent(self) -> tuple[list[float], list[float]]: ...
+    def statistics(self) -> dict[str, int]: ...
+    def distance(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
+    def bounds(
+        self, points: _Floats, threads: int | None = None, progress: _Progress = None
+    ) -> tuple[_Floats, _Floats]: ...
+    def gradient(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
+
+def cast_rays(
+    field: AdaptiveField,
+    origins: _Floats,
+    directions: _Floats,
+    method: str,
+    distance: float,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[_Floats, _Floats, _Floats]: ...
+def occluded_rays(
+    field: AdaptiveField,
+    origins: _Floats,
+    directions: _Floats,
+    length: float,
+    method: str,
+    distance: float,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> NDArray[np.bool_]: ...
+def adaptive_surface(
+    field: AdaptiveField,
+    distance: float,
+    shape: Shape | None,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[_Floats, NDArray[np.int64], list[float], list[float]]: ...
+def collide(
+    first: Shape | AdaptiveField,
+    second: Shape | AdaptiveField,
+    tolerance: float,
+    budget: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[
+    Literal["separated", "penetrating", "touching or undecided"], float, float, list[float], list[float], int
+]: ...
+def solid_extent(
+    field: AdaptiveField, distance: float, threads: int | None = None, progress: _Progress = None
+) -> tuple[list[float], list[float]]: ...
+def render_field(
+    field: AdaptiveField,
+    camera: Camera,
+    width: int,
+    height: int,
+    colour: tuple[int, int, int],
+    distance: float,
+    samples: int = 9,
+    background: tuple[int, int, int] | None = None,
+    occlusion: float = 0.0,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> tuple[NDArray[np.uint8], NDArray[np.float32]]: ...

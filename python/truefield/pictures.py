@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 
-from truefield._truefield import Camera, Scene
+from truefield._truefield import Camera, Scene, render_field, solid_extent
+from truefield.adaptive import AdaptiveField
 from truefield.cloud import PointCloud
 from truefield.colours import Colour, colours_of, distinct, even_map
 from truefield.errors import TruefieldError
@@ -116,6 +117,57 @@ def part_picture(
     scene = Scene()
     _add_part(scene, mesh, size, colour=colour)
     return _finished(_render(scene, _camera(mesh, view), size, background, (threads, progress)), path)
+
+
+def field_picture(
+    field: AdaptiveField,
+    path: PathLike | None = None,
+    *,
+    distance: float = 0.0,
+    view: View = "isometric",
+    size: tuple[int, int] = (1600, 1200),
+    samples: int = 9,
+    colour: Colour = _METAL,
+    background: Colour | None = WHITE,
+    threads: int | None = None,
+    progress: Progress | None = None,
+) -> Image.Image:
+    """The surface of an adaptive field by rays, without a mesh between.
+
+    Args:
+        field: what to draw.
+        path: PNG to write, or None.
+        distance: of the surface, model units: 0 the shape itself, more of it grown, less of it shrunk.
+        view: from where; see the module.
+        size: width and height in pixels.
+        samples: rays a pixel: 1, 9 or 25.
+        colour: of the surface.
+        background: a colour, or None for a transparent picture.
+        threads: worker threads.
+        progress: told the phase and the fraction done.
+
+    Raises:
+        TruefieldError: an input cannot be drawn; the sentence says why.
+    """
+    _check_size(size)
+    low, high = (np.array(corner) for corner in solid_extent(field._native, distance, threads, progress))
+    corners = np.array([np.where([i & 1, i & 2, i & 4], high, low) for i in range(8)])
+    camera = _view(corners, view, 0.06)
+    pixels, _ = render_field(
+        field._native,
+        camera,
+        size[0],
+        size[1],
+        colour,
+        distance,
+        samples=samples,
+        background=background,
+        occlusion=_OCCLUSION,
+        threads=threads,
+        progress=progress,
+    )
+    image = Image.fromarray(pixels)
+    return _finished(image if background is None else image.convert("RGB"), path)
 
 
 def thickness_picture(
@@ -426,6 +478,10 @@ def _camera(mesh: TriangleMesh, view: View, more: Array | None = None, *, margin
     points = mesh.vertices[np.unique(mesh.triangles)]
     if more is not None:
         points = np.concatenate([points, more])
+    return _view(points, view, margin)
+
+
+def _view(points: Array, view: View, margin: float) -> Camera:
     if isinstance(view, str):
         return Camera(points, view, margin=margin)
     try:

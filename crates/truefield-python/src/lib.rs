@@ -3,6 +3,7 @@
 // Python has keyword arguments; their number is no burden there.
 #![allow(clippy::too_many_arguments)]
 
+mod adaptive;
 mod check;
 mod contour;
 mod convert;
@@ -11,6 +12,7 @@ mod door;
 mod field;
 mod implicit;
 mod marching;
+mod products;
 mod render;
 mod sampled;
 mod shape;
@@ -27,6 +29,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<surface::PySurface>()?;
     module.add_class::<field::PyCompleteField>()?;
     module.add_class::<sampled::PySampledField>()?;
+    module.add_class::<adaptive::PyAdaptiveField>()?;
     module.add_class::<shape::PyShape>()?;
     module.add_class::<implicit::PyExpression>()?;
     module.add_class::<render::PyCamera>()?;
@@ -51,5 +54,11 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     module.add_function(wrap_pyfunction!(csg::sphere, module)?)?;
     module.add_function(wrap_pyfunction!(csg::cuboid, module)?)?;
+    module.add_function(wrap_pyfunction!(products::cast_rays, module)?)?;
+    module.add_function(wrap_pyfunction!(products::occluded_rays, module)?)?;
+    module.add_function(wrap_pyfunction!(products::adaptive_surface, module)?)?;
+    module.add_function(wrap_pyfunction!(products::collide_solids, module)?)?;
+    module.add_function(wrap_pyfunction!(products::solid_extent, module)?)?;
+    module.add_function(wrap_pyfunction!(products::draw_field, module)?)?;
     Ok(())
 }

@@ -54,6 +54,16 @@ fn finish(name: &str) -> Result<Finish> {
     }
 }
 
+/// How many samples a pixel has.
+pub fn samples(count: u32) -> PyResult<Samples> {
+    match count {
+        1 => Ok(Samples::One),
+        9 => Ok(Samples::Nine),
+        25 => Ok(Samples::TwentyFive),
+        _ => Err(raise(Error::invalid(format!("a pixel takes 1, 9 or 25 samples, not {count}")))),
+    }
+}
+
 type Pen = Option<((u8, u8, u8), f64, f64)>;
 
 fn ink(pen: Pen) -> Option<Ink> {
@@ -62,7 +72,7 @@ fn ink(pen: Pen) -> Option<Ink> {
 
 /// Where the viewer stands.
 #[pyclass(name = "Camera", module = "truefield._truefield", frozen)]
-pub struct PyCamera(Camera);
+pub struct PyCamera(pub Camera);
 
 #[pymethods]
 impl PyCamera {
@@ -252,12 +262,7 @@ impl PyScene {
         threads: Option<usize>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Drawn<'py>> {
-        let samples = match samples {
-            1 => Samples::One,
-            9 => Samples::Nine,
-            25 => Samples::TwentyFive,
-            _ => return Err(raise(Error::invalid(format!("a pixel takes 1, 9 or 25 samples, not {samples}")))),
-        };
+        let samples = self::samples(samples)?;
         let background = background.map_or(Background::Transparent, |(r, g, b)| Background::Colour([r, g, b]));
         let canvas = Canvas { width, height, samples, background, occlusion };
         let Picture { rgba, depth, .. } = job(py, threads, progress, |run| render(&self.0, &camera.0, &canvas, run))?;

@@ -10,6 +10,7 @@ from truefield.cli.contour import contour
 from truefield.cli.distance import distance
 from truefield.cli.field import field
 from truefield.cli.info import info
+from truefield.cli.render import render
 from truefield.cli.sample import sample
 from truefield.cli.surface import surface
 from truefield.cli.thickness import thickness
@@ -23,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (info, thickness, contour, distance, field, sample, surface, transform):
+for command in (info, thickness, contour, distance, field, sample, surface, render, transform):
     app.command()(command)
 
 

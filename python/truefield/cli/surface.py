@@ -1,4 +1,4 @@
-"""`truefield surface`: where a volume of distances has a value, as a mesh."""
+"""`truefield surface`: where a field or a volume of distances has a value, as a mesh."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Threads
+from truefield.cli.options import FIELD_SUFFIX, Threads
 from truefield.cli.progress import progress
 
 
@@ -23,7 +23,9 @@ def surface(
     volume: Annotated[
         Path,
         typer.Argument(
-            metavar="VOLUME", show_default=False, help="Distances: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif, .zarr."
+            metavar="FIELD",
+            show_default=False,
+            help="Distances: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif, .zarr; or a field: .tfield.",
         ),
     ],
     *,
@@ -31,21 +33,37 @@ def surface(
         Path, typer.Option("--output", "-o", show_default=False, help="What to write: .stl, .obj, .ply or .off.")
     ],
     distance: Annotated[
-        float, typer.Option("--distance", help="The value at the surface; what is below it is inside.")
+        float,
+        typer.Option(
+            "--distance", "--offset", help="The value at the surface, what is below it is inside: how far it is grown."
+        ),
     ] = 0.0,
     border: Annotated[
         Border, typer.Option("--border", help="`closed` closes it where the volume ends; `open` leaves a rim.")
     ] = Border.CLOSED,
     threads: Threads = None,
 ) -> None:
-    """The surface at a distance, as a closed mesh: marching cubes."""
+    """The surface at a distance, as a closed mesh.
+
+    Marching cubes of volumes and sampled fields, dual contouring of adaptive ones.
+    """
     import truefield as tf
     from truefield import files, formats
 
     formats.check(output)
     files.check_file(output)
-    field = tf.SampledField.from_volume(tf.read_volume(volume))
     with progress() as report:
-        mesh = field.surface(distance, border=border.value, threads=threads, progress=report)
+        if volume.suffix.lower() == FIELD_SUFFIX:
+            field = tf.load(volume, threads=threads, progress=report)
+        else:
+            field = tf.SampledField.from_volume(tf.read_volume(volume))
+        if isinstance(field, tf.AdaptiveField):
+            if border is Border.OPEN:
+                raise tf.TruefieldError("the surface of an adaptive field is always closed; leave --border out")
+            mesh = field.surface(distance, threads=threads, progress=report)
+        elif isinstance(field, tf.SampledField):
+            mesh = field.surface(distance, border=border.value, threads=threads, progress=report)
+        else:
+            raise tf.TruefieldError(f"'{volume}' is a complete field; it keeps the mesh itself")
     mesh.write(output)
     typer.echo(f"{output}: {len(mesh.triangles)} triangles at distance {distance:g}, {len(mesh.vertices)} vertices")

@@ -62,6 +62,8 @@ pub struct Caster {
     pub(super) corners: Vec<[f32; 8]>,
     /// Middles of leaves that answer in another way.
     pub(super) others: Vec<DVec3>,
+    /// The box of all cells that the surface meets.
+    solid: Aabb,
 }
 
 /// Part of a caster while it is made.
@@ -70,6 +72,7 @@ struct Part {
     nodes: Vec<[u32; 8]>,
     corners: Vec<[f32; 8]>,
     others: Vec<DVec3>,
+    solid: Option<Aabb>,
 }
 
 impl Caster {
@@ -94,9 +97,24 @@ impl Caster {
         let mut whole = Part::default();
         let roots: Vec<Child> = parts.into_iter().map(|(part, root)| whole.append(part, root)).collect();
         let root = whole.join(field.root(), &mut roots.into_iter()).word();
-        let Part { nodes, corners, others } = whole;
+        let Part { nodes, corners, others, solid } = whole;
         let columns = field.division() == Division::Quadtree;
-        Ok(Self { field: field.clone(), distance, extent: field.extent_box(), columns, root, nodes, corners, others })
+        Ok(Self {
+            field: field.clone(),
+            distance,
+            extent: field.extent_box(),
+            columns,
+            root,
+            nodes,
+            corners,
+            others,
+            solid: solid.unwrap_or(field.extent_box()),
+        })
+    }
+
+    /// The box of all cells that the surface meets; the domain where it meets none.
+    pub fn solid(&self) -> Aabb {
+        self.solid
     }
 }
 
@@ -104,14 +122,18 @@ impl Part {
     fn add(&mut self, cell: Cell<'_>, distance: f64) -> Child {
         let count = cell.children();
         if count == 0 {
+            let extent = cell.extent();
+            let mut met = || self.solid = Some(self.solid.map_or(extent, |solid| solid.union(extent)));
             let below = cell.corners().iter().filter(|&&v| f64::from(v) < distance).count();
             return match cell.leaf() {
                 Leaf::Linear if below % 8 != 0 => {
+                    met();
                     self.corners.push(*cell.corners());
                     Child::Linear(self.corners.len() as u32 - 1)
                 }
                 Leaf::Cubic(_) | Leaf::Exact(_) if below % 8 != 0 || cell.over().contains(distance) => {
-                    self.others.push(cell.extent().center());
+                    met();
+                    self.others.push(extent.center());
                     Child::Other(self.others.len() as u32 - 1)
                 }
                 _ => Child::Empty(below == 8),
@@ -145,6 +167,7 @@ impl Part {
         self.nodes.extend(other.nodes.into_iter().map(|node| node.map(|word| moved(Child::of(word)).word())));
         self.corners.extend(other.corners);
         self.others.extend(other.others);
+        self.solid = [self.solid, other.solid].into_iter().flatten().reduce(Aabb::union);
         moved(root)
     }
 

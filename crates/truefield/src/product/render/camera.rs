@@ -207,6 +207,16 @@ impl Lens {
         DVec3::new(v.dot(self.camera.right), v.dot(self.camera.up), v.dot(self.camera.forward))
     }
 
+    /// The point that camera coordinates stand for.
+    pub(super) fn model_point(&self, p: DVec3) -> DVec3 {
+        self.camera.eye + self.model_vector(p)
+    }
+
+    /// The direction that camera coordinates stand for.
+    pub(super) fn model_vector(&self, v: DVec3) -> DVec3 {
+        self.camera.right * v.x + self.camera.up * v.y + self.camera.forward * v.z
+    }
+
     /// Pixel coordinates of a point before the eye, given in camera coordinates.
     pub(super) fn pixel_of(&self, p: DVec3) -> [f64; 2] {
         let v = self.raster_point(p);

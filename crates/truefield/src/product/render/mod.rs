@@ -13,6 +13,7 @@ mod crease;
 mod disc;
 mod draw;
 mod facing;
+mod field;
 mod line;
 mod occlusion;
 mod plan;
@@ -24,6 +25,7 @@ mod tile;
 mod visible;
 
 pub use camera::{Camera, Lens, Projection, View};
+pub use field::render_field;
 pub use sampled::SurfaceSamples;
 pub use scene::{Balls, Finish, Ink, Paint, Ramp, Rgb, Scene, Splats, Triangles};
 pub use spacing::covering_radius;
@@ -96,15 +98,8 @@ const NEIGHBOURHOOD: f64 = 0.06;
 /// it touches. Raises [`Error::Invalid`] for a size of 0 or above 16384 and for an occlusion outside 0 to 1, and
 /// [`Error::Memory`] where the tile lists would need more than 2 GiB.
 pub fn render(scene: &Scene, camera: &Camera, canvas: &Canvas, run: &Run<'_>) -> Result<Picture> {
+    check(canvas)?;
     let Canvas { width, height, .. } = *canvas;
-    if !(1..=LARGEST).contains(&width) || !(1..=LARGEST).contains(&height) {
-        return Err(Error::invalid(format!(
-            "a picture of {width} x {height} pixels cannot be drawn; both sides must lie between 1 and {LARGEST}"
-        )));
-    }
-    if !(0.0..=1.0).contains(&canvas.occlusion) {
-        return Err(Error::invalid(format!("the occlusion must lie between 0 and 1, not {}", canvas.occlusion)));
-    }
     let plan = Plan::new(scene, camera.lens(width, height), run)?;
     let depth = depth_picture(&plan, run)?;
     let openness = match scene.extent() {
@@ -121,6 +116,20 @@ pub fn render(scene: &Scene, camera: &Camera, canvas: &Canvas, run: &Run<'_>) ->
     Ok(Picture { width, height, rgba, depth })
 }
 
+/// Refuses what cannot be drawn on.
+fn check(canvas: &Canvas) -> Result<()> {
+    let Canvas { width, height, .. } = *canvas;
+    if !(1..=LARGEST).contains(&width) || !(1..=LARGEST).contains(&height) {
+        return Err(Error::invalid(format!(
+            "a picture of {width} x {height} pixels cannot be drawn; both sides must lie between 1 and {LARGEST}"
+        )));
+    }
+    if !(0.0..=1.0).contains(&canvas.occlusion) {
+        return Err(Error::invalid(format!("the occlusion must lie between 0 and 1, not {}", canvas.occlusion)));
+    }
+    Ok(())
+}
+
 fn tiles(plan: &Plan<'_>) -> usize {
     (plan.lens.width.div_ceil(TILE) * plan.lens.height.div_ceil(TILE)) as usize
 }
@@ -131,7 +140,7 @@ fn depth_picture(plan: &Plan<'_>, run: &Run<'_>) -> Result<Vec<f32>> {
         let visible = Visible::resolve(plan, tile, &pattern);
         Ok((visible.area, visible.depth.into_iter().map(|[d]| d).collect::<Vec<_>>()))
     })?;
-    Ok(assemble(plan, &parts, f32::INFINITY))
+    Ok(assemble(&plan.lens, &parts, f32::INFINITY))
 }
 
 fn colours<const N: usize>(plan: &Plan<'_>, openness: Option<&Openness>, background: Background, run: &Run<'_>) -> Result<Vec<u8>> {
@@ -140,7 +149,7 @@ fn colours<const N: usize>(plan: &Plan<'_>, openness: Option<&Openness>, backgro
         let (area, pixels) = draw::draw(plan, tile, &pattern, openness)?;
         Ok((area, pixels.into_iter().map(|pixel| finish(pixel, background)).collect::<Vec<_>>()))
     })?;
-    Ok(assemble(plan, &parts, [0; 4]).into_flattened())
+    Ok(assemble(&plan.lens, &parts, [0; 4]).into_flattened())
 }
 
 /// Light times opacity over the background, as bytes.
@@ -159,8 +168,8 @@ fn finish([r, g, b, opacity]: [f32; 4], background: Background) -> [u8; 4] {
     }
 }
 
-fn assemble<T: Copy>(plan: &Plan<'_>, parts: &[(Area, Vec<T>)], empty: T) -> Vec<T> {
-    let (width, height) = (plan.lens.width as usize, plan.lens.height as usize);
+fn assemble<T: Copy>(lens: &Lens, parts: &[(Area, Vec<T>)], empty: T) -> Vec<T> {
+    let (width, height) = (lens.width as usize, lens.height as usize);
     let mut whole = vec![empty; width * height];
     for (area, part) in parts {
         let across = (area.x1 - area.x0) as usize;
