@@ -5,6 +5,7 @@
 
 pub mod boolean;
 pub mod edit;
+pub mod level_of_detail;
 pub mod offset;
 pub mod resample;
 mod solid;

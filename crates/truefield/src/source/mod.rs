@@ -6,5 +6,6 @@ pub mod function;
 pub mod implicit;
 pub mod mesh;
 pub mod patch;
+pub mod polygon;
 
 pub use ask::{bounds, gradients, values};

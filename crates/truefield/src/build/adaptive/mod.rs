@@ -4,6 +4,7 @@
 //! level are independent. The paper compares 19 points of a cell; here a cell is also proven, between its samples too
 //! (`verify`), whichever rule divides it.
 
+mod coalesce;
 pub(crate) mod verify;
 
 use crate::distance::Source;
@@ -13,6 +14,7 @@ use crate::field::adaptive::{Accuracy, AdaptiveField, Division, Level, LevelKind
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
+pub use coalesce::coalesce;
 use verify::{Block, Found};
 
 /// Cells a worker takes in one go.

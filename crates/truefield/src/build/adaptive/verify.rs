@@ -100,10 +100,9 @@ impl Block {
 
     /// Proves what can be proven.
     pub fn verify(&self, cell: &Aabb, samples: &[f64], bend: Interval, noise: f64) -> Found {
-        let axes = self.division.axes() as f64;
-        let spacing = cell.size().x / self.steps as f64;
-        let way = 0.5 * axes.sqrt() * spacing * (1.0 + 1e-12);
-        let square = axes / 8.0 * spacing * spacing * (1.0 + 1e-12);
+        let step = (0..self.division.axes()).map(|axis| (cell.size()[axis] / self.steps as f64).powi(2)).sum::<f64>();
+        let way = 0.5 * step.sqrt() * (1.0 + 1e-12);
+        let square = step / 8.0 * (1.0 + 1e-12);
         let first = way + 2.0 * noise;
         // Between the samples, minus their interpolation.
         let between = Interval {

@@ -4,8 +4,9 @@ use std::collections::{HashMap, HashSet, VecDeque};
 use std::sync::Arc;
 
 use super::page::{Kind, ListSide, PAGE_DEPTH, Page, Record, Samples, Word};
-use super::{AdaptiveField, Cell, Edits, Leaf};
+use super::{AdaptiveField, Cell, Edits, Leaf, about_corners};
 use crate::error::Result;
+use crate::geom::Interval;
 use crate::run::Run;
 
 /// Anything that can be walked from its root down.
@@ -133,6 +134,21 @@ impl Patched<'_> {
             Self::Kept(cell) => *cell.record(),
             Self::Branch(record, _) | Self::Linear(record) | Self::Cubic(record, _) | Self::Exact(record, ..) => *record,
         }
+    }
+}
+
+impl Patched<'_> {
+    /// Contains the distance minus the interpolated corners.
+    pub fn error_about_corners(&self) -> Interval {
+        let samples = match self {
+            Self::Kept(cell) => match cell.leaf() {
+                Leaf::Cubic(samples) => Some(samples),
+                Leaf::Linear | Leaf::Exact(_) => None,
+            },
+            Self::Cubic(_, samples) => Some(&**samples),
+            _ => None,
+        };
+        about_corners(&self.record(), samples)
     }
 }
 

@@ -80,7 +80,7 @@ impl Level {
     }
 
     /// How many cells of the same kind come before each.
-    fn ranks(&self) -> Vec<u32> {
+    pub(crate) fn ranks(&self) -> Vec<u32> {
         let mut counts = [0u32; 4];
         let rank = |kind: &LevelKind| {
             let count = &mut counts[*kind as usize];
@@ -111,6 +111,13 @@ impl Levels {
                 }
             }
         }
+    }
+
+    /// Cuts off what is deeper; cells of the last level are leaves then.
+    pub fn cut(&mut self, depth: u32) {
+        self.levels.truncate(depth as usize + 1);
+        let Some(last) = self.levels.last_mut() else { return };
+        last.kinds.iter_mut().filter(|kind| **kind == LevelKind::Branch).for_each(|kind| *kind = LevelKind::Linear);
     }
 
     /// What is wrong with the arrays, if anything is; `triangles` is the number of the surface's.

@@ -7,6 +7,7 @@
 mod accuracy;
 mod assemble;
 mod cell;
+mod coarse;
 mod cubic;
 mod edits;
 mod levels;
@@ -18,7 +19,8 @@ pub use accuracy::Accuracy;
 pub(crate) use assemble::{Patch, Patched};
 pub(crate) use cell::aged_error;
 pub use cell::{Cell, Leaf, Root};
-pub(crate) use cubic::{bends, range as cubic_range, third as cubic_third, value as cubic_value};
+pub(crate) use coarse::{about_corners, differences};
+pub(crate) use cubic::{bends, third as cubic_third, value as cubic_value};
 pub(crate) use edits::farthest;
 pub use edits::{Change, Edit, Edits};
 pub use levels::{Level, LevelKind, Levels};

@@ -287,7 +287,7 @@ impl<'a> Divider<'a> {
             }
         };
         // Steeper than a distance: as if it were one with so much noise.
-        let steps = 0.25 * extent.size().x * (self.field.division().axes() as f64).sqrt();
+        let steps = 0.25 * (0..self.field.division().axes()).map(|axis| extent.size()[axis].powi(2)).sum::<f64>().sqrt();
         let found = block.verify(extent, &samples, bend, self.tool.noise() + 0.5 * (steep - 1.0).max(0.0) * steps * (1.0 + 1e-12));
         let accuracy = self.field.accuracy();
         let own = found.linear;

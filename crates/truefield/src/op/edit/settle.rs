@@ -1,9 +1,7 @@
 //! The tree of an edited shape, from its leaves up: what became simple is one cell again, and every cell gets its record.
 
 use super::divide::{Made, MadeKind, Piece, State, rounding};
-use crate::field::adaptive::{
-    Accuracy, AdaptiveField, Change, Division, Edits, Leaf, Patched, Record, Samples, aged_error, cubic_range, cubic_third, farthest,
-};
+use crate::field::adaptive::{Accuracy, AdaptiveField, Change, Division, Edits, Patched, Record, aged_error, differences, farthest};
 use crate::geom::{Aabb, DVec3, Interval};
 
 /// Merges siblings whose values their parent can say as well.
@@ -52,18 +50,6 @@ fn merge<'a>(children: &[&Made<'_>], division: Division, accuracy: Accuracy, ext
     }
     let error = error.widen(rounding(extent, &corners.map(f64::from)));
     Some(Made { corners, error, own, open: children.iter().any(|child| child.open), kind: MadeKind::Linear })
-}
-
-/// Contains what a child's corners say minus what its parent's say: both are trilinear in the child, so that corners decide.
-pub(super) fn differences(parent: &Record, child: &[f32; 8], division: Division, octant: usize) -> Interval {
-    let at = |corner: usize| {
-        DVec3::from_array(std::array::from_fn(|axis| {
-            let bit = (corner >> axis & 1) as f64;
-            if axis < division.axes() { 0.5 * ((octant >> axis & 1) as f64 + bit) } else { bit }
-        }))
-    };
-    let apart = (0..8).map(|corner| Interval::exact(f64::from(child[corner]) - parent.value(at(corner))));
-    apart.reduce(Interval::hull).unwrap_or(Interval::ALL)
 }
 
 /// Bounds from above what only points inside bound.
@@ -155,7 +141,7 @@ pub(super) fn patched<'a>(pieces: Vec<Piece<'a>>, field: &AdaptiveField, change:
             for (octant, child) in children.iter().enumerate() {
                 let (depth, index) = places[first as usize + octant];
                 let part = field.placement().cell(depth, index);
-                let of_child = child.about_corners();
+                let of_child = child.error_about_corners();
                 let said = child.record().range();
                 let before = said.plus(of_child);
                 let after = edits.age_where(before, &part, &|edit| edit.reaches(&extent) && !edit.reaches(&part));
@@ -168,23 +154,4 @@ pub(super) fn patched<'a>(pieces: Vec<Piece<'a>>, field: &AdaptiveField, change:
         }
     }
     cells
-}
-
-impl Patched<'_> {
-    /// Contains the distance minus the interpolated corners.
-    fn about_corners(&self) -> Interval {
-        let record = self.record();
-        let samples = match self {
-            Self::Kept(cell) if cell.is_leaf() => match cell.leaf() {
-                Leaf::Cubic(samples) => samples,
-                Leaf::Linear | Leaf::Exact(_) => return record.error(),
-            },
-            Self::Cubic(_, samples) => samples,
-            _ => return record.error(),
-        };
-        let apart: Samples = std::array::from_fn(|n| (f64::from(samples[n]) - record.value(cubic_third(n))) as f32);
-        let (lower, upper) = cubic_range(&apart);
-        let rounding = 27.0 * f64::from(f32::EPSILON) * samples.iter().fold(0.0, |size: f64, v| size.max(f64::from(v.abs())));
-        record.error().plus(Interval { lower, upper }).widen(rounding)
-    }
 }
