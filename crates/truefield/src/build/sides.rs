@@ -152,7 +152,7 @@ impl Flood {
 }
 
 /// The nearest triangle of a point, from the complete list of a box around it where that is short.
-fn nearest(tree: &Tree, list: &[Slot], p: DVec3) -> Candidate {
+pub(crate) fn nearest(tree: &Tree, list: &[Slot], p: DVec3) -> Candidate {
     let mut best = Candidate::within(f64::INFINITY);
     if list.is_empty() || list.len() > SEARCHED {
         return tree.nearest(p, best);

@@ -63,10 +63,23 @@ pub(crate) fn gather(tree: &Tree, cell: &Aabb, near: Slot, window: Range, scratc
     out.clear();
     if range.meets(window) {
         let witness = tree.facet(first.triangle).nearest(cell.center()).point;
-        collect(tree, cell, witness, &mut scratch.stack, out);
+        collect(tree, cell, witness, usize::MAX, &mut scratch.stack, out);
         out.sort_unstable();
     }
     range
+}
+
+/// The complete list of `cell` in `out`, of which `witness` is a point of the surface nearby; false, and no list, where
+/// about `most` triangles cannot be ruled out at once.
+pub(crate) fn gather_few(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, scratch: &mut Scratch, out: &mut Vec<Slot>) -> bool {
+    out.clear();
+    collect(tree, cell, witness, most, &mut scratch.stack, out);
+    if out.len() > most {
+        out.clear();
+        return false;
+    }
+    out.sort_unstable();
+    true
 }
 
 multiversion!(
@@ -81,16 +94,18 @@ multiversion!(
     ) -> [Range; OCTANTS] = refine_body
 );
 
-multiversion!(fn collect(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut Vec<u32>, out: &mut Vec<Slot>) = collect_body);
+multiversion!(
+    fn collect(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, stack: &mut Vec<u32>, out: &mut Vec<Slot>) = collect_body
+);
 
 /// How far single-precision distances from points of `cell` may be off.
 pub(crate) fn filter_error(tree: &Tree, cell: &Aabb) -> f64 {
     FILTER_ERROR * ((cell.center() - tree.center).length() + cell.radius() + 2.0 * tree.radius)
 }
 
-/// Descends into every node that the witness does not rule out for the whole cell.
+/// Descends into every node that the witness does not rule out for the whole cell; gives up beyond `most` triangles.
 #[inline(always)]
-fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut Vec<u32>, out: &mut Vec<Slot>) {
+fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, stack: &mut Vec<u32>, out: &mut Vec<Slot>) {
     let (low, high, q) = (cell.min - tree.center, cell.max - tree.center, witness - tree.center);
     let size = low.abs().max(high.abs()).max_element() + tree.radius;
     // Rounding of sums of squares of coordinates up to `size`.
@@ -98,6 +113,9 @@ fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, stack: &mut V
     stack.clear();
     stack.push(0);
     while let Some(index) = stack.pop() {
+        if out.len() > most {
+            return;
+        }
         let node = &tree.nodes[index as usize];
         let mut least = [0.0f64; WIDTH];
         for axis in 0..3 {

@@ -5,6 +5,8 @@
 //! (`verify`), whichever rule divides it.
 
 mod coalesce;
+mod facets;
+mod mesh;
 pub(crate) mod verify;
 
 use crate::distance::Source;
@@ -15,6 +17,7 @@ use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
 pub use coalesce::coalesce;
+pub use mesh::{Leaves, adaptive_mesh};
 use verify::{Block, Found};
 
 /// Cells a worker takes in one go.

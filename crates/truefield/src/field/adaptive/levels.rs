@@ -8,6 +8,7 @@ use super::page::{Lists, PAGE_DEPTH, Record, Samples};
 use super::{Accuracy, AdaptiveField, Cell, Division, Edits, Leaf, MAX_DEPTH, Root};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
+use crate::geom::{DVec3, Interval};
 use crate::run::Run;
 use crate::source::mesh::Surface;
 
@@ -95,6 +96,35 @@ impl Levels {
     /// A tree without levels yet.
     pub fn new(root: Root, continuity: Continuity, accuracy: Accuracy) -> Self {
         Self { root, continuity, accuracy, edits: Edits::default(), levels: Vec::new() }
+    }
+
+    /// Gives inner cells the errors that follow from their children's, where those are smaller: what children say is
+    /// trilinear where their parent's interpolation is too, so that the difference is largest at their corners.
+    ///
+    /// For trees without tricubic leaves.
+    pub fn derive_errors(&mut self) {
+        let group = self.root.division.children();
+        for depth in (1..self.levels.len()).rev() {
+            let (above, below) = self.levels.split_at_mut(depth);
+            let (Some(parents), Some(children)) = (above.last_mut(), below.first()) else { return };
+            let branches = parents.kinds.iter().zip(&mut parents.records).filter(|(kind, _)| **kind == LevelKind::Branch);
+            for ((_, parent), group) in branches.zip(children.records.chunks_exact(group)) {
+                let mut error = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
+                for (octant, child) in group.iter().enumerate() {
+                    for corner in 0..8 {
+                        let at = DVec3::from_array([0, 1, 2].map(|axis| match (self.root.division, axis) {
+                            (Division::Quadtree, 2) => (corner >> axis & 1) as f64,
+                            _ => 0.5 * ((octant >> axis & 1) + (corner >> axis & 1)) as f64,
+                        }));
+                        let difference = f64::from(child.corners[corner]) - parent.value(at);
+                        error = error.hull(Interval::exact(difference).plus(child.error()));
+                    }
+                }
+                let rounding = 1e-14 * parent.corners.iter().fold(0.0, |size, &v| f64::max(size, f64::from(v.abs())));
+                let error = error.widen(rounding).intersection(parent.error());
+                *parent = Record::new(parent.corners, error);
+            }
+        }
     }
 
     /// Widens the errors of cells to at least those of their children: a coarser tree never promises more.

@@ -86,6 +86,11 @@ impl Surface {
         self.signs.steady(&self.work, p, nearest, triangle, radius)
     }
 
+    /// See `Signs::whole`, in the tree's units.
+    pub(crate) fn whole(&self, triangle: u32, reach: f64) -> Option<f64> {
+        self.signs.whole(triangle, reach)
+    }
+
     /// Whether two points joined by a path off the surface are always on the same side.
     pub(crate) fn side_changes_at_surface_only(&self) -> bool {
         self.signs.changes_at_surface_only()

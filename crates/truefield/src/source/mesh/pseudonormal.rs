@@ -129,6 +129,14 @@ impl Pseudonormals {
         self.rounding
     }
 
+    /// Whether the surface is proven to be whole all around a triangle: at its face, its edges and its corners.
+    pub fn whole(&self, triangle: u32) -> bool {
+        let t = triangle as usize;
+        let edges = self.edge_of[t].iter().all(|&edge| self.edges.get(edge as usize).is_some_and(|normal| normal.error.is_finite()));
+        let corners = self.corner_of[t].iter().all(|&corner| self.corners[corner as usize].error.is_finite());
+        edges && corners && self.room.get(t).is_some_and(|room| room[0] > 0.0)
+    }
+
     /// The side of `p`, whose nearest point is `nearest` on `triangle`: positive outside, negative inside;
     /// `None` where rounding may have turned it.
     pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<f64> {

@@ -197,6 +197,21 @@ impl Signs {
         }
     }
 
+    /// How far edges that meet may be apart, where the surface is whole all around a triangle and parts outside, on the
+    /// side of its normal, from inside up to `reach` from it; `None` where that is not known.
+    pub fn whole(&self, triangle: u32, reach: f64) -> Option<f64> {
+        let decided = self.decided.as_ref()?;
+        let plain = match &decided.walls {
+            Walls::Trusted => false,
+            Walls::Clean => true,
+            Walls::Known(walls) => {
+                let wall = &walls[triangle as usize];
+                wall.is_plain() && f64::from(wall.reach) > reach
+            }
+        };
+        (plain && decided.normals.whole(triangle)).then(|| decided.normals.rounding())
+    }
+
     /// Whether the point is so near that joining vertices may have turned its side.
     fn blurred(&self, nearest: &FacetPoint) -> bool {
         nearest.distance_squared <= self.blur * self.blur

@@ -46,6 +46,11 @@ impl Wall {
     /// Outside on the outer side, inside on the inner one, everywhere.
     pub const CLEAN: Self = Self { winding: 0, reach: f32::INFINITY };
 
+    /// Whether its outer side is outside and its inner one inside.
+    pub fn is_plain(&self) -> bool {
+        self.winding == 0
+    }
+
     /// The side of a point on the outer side (`height` positive) or the inner one.
     pub fn side(&self, height: f64) -> Side {
         let winding = if height > 0.0 { self.winding } else { self.winding + 1 };

@@ -1,0 +1,234 @@
+//! What is proven of a cell by the triangles that can be nearest in it.
+//!
+//! Let u be the unsigned distance, I its interpolation from the corners c of a cell with half diagonal R, and d(T) the
+//! distance to one triangle of the cell's complete list. Interpolation keeps order, and the interpolation of an affine
+//! function is the function itself.
+//! 1. u^2 - |p|^2 is the least of affine functions, so concave: u^2 >= I(u^2) - I(|p|^2) + |p|^2 >= I(u)^2 - S; see `spread`.
+//! 2. u is at most the distance to any point or triangle of the surface, which is convex: u - I is at most the largest
+//!    d(T) - u at the corners.
+//! 3. u is one of the d(T), each of which lies above its tangent at the cell's centre: u - I is at least the least over T
+//!    of the least (tangent - u) at the corners.
+//! 4. Near a sound piece of surface, signed: let all normals n of the list be within a of their mean, and q, on triangle T,
+//!    be nearest to p. The triangles around q lead away in all directions, none of them nearer to p, so p - q is within a
+//!    of the mean, up or down, and |p - q| lies between n.(p - q) and n.(p - q) / cos 2a.
+//! 5. There the gradient of the distance is within a of the mean m, so that the distance less m.p changes by at most
+//!    sqrt(2 - 2 cos a) times as much as one moves, and between samples it is that much nearer to their interpolation,
+//!    which is exact for m.p.
+
+use crate::bvh::cover::Range;
+use crate::bvh::tree::Slot;
+use crate::geom::{Aabb, DVec3, Interval};
+use crate::source::mesh::{Side, Surface};
+
+/// Longer lists are not looked through triangle by triangle.
+const SHORT: usize = 32;
+
+/// Longer lists are not looked through plane by plane.
+const PLANES: usize = 128;
+
+/// Triangles flatter than this have no normal to rely on.
+const FLAT: f64 = 1e-6;
+
+/// A lattice point, in the tree's units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    /// Signed distance.
+    pub value: f64,
+    /// Whether its sign is.
+    pub certain: bool,
+    pub point: DVec3,
+    /// The nearest point of the surface.
+    pub foot: DVec3,
+    /// Its triangle.
+    pub near: Slot,
+}
+
+/// A cell, and what is known of it.
+pub(super) struct At<'a> {
+    pub cell: Aabb,
+    /// Of unsigned distances in it.
+    pub range: Range,
+    /// The side of all its points, where that is known.
+    pub side: Option<Side>,
+    pub corners: [Corner; 8],
+    pub center: Corner,
+    /// What is said at the corners, and between them by interpolation: by the cell itself or by one that it is a part of.
+    pub told: [f64; 8],
+    /// Every triangle that can be nearest in it.
+    pub list: &'a [Slot],
+}
+
+/// Proves cells of one surface; all lengths are in the tree's units.
+pub(super) struct Prover<'a> {
+    surface: &'a Surface,
+}
+
+/// A plane and how far from the corners it lies.
+struct Plane {
+    normal: DVec3,
+    heights: [f64; 8],
+}
+
+impl<'a> Prover<'a> {
+    pub fn new(surface: &'a Surface) -> Self {
+        Self { surface }
+    }
+
+    /// Contains the distance minus the interpolation of what is told: without a look at the list.
+    pub fn coarse(&self, at: &At<'_>) -> Interval {
+        let corners = &at.corners;
+        let told = at.told;
+        let (low, high) = ends(&told);
+        let [lower, upper] = [at.range.lower, at.range.upper];
+        let range = match at.side {
+            Some(Side::Inside) => Interval { lower: -upper, upper: -lower },
+            Some(Side::Outside) => Interval { lower, upper },
+            _ => Interval::either_side(upper),
+        };
+        let mut known = Interval { lower: range.lower - high, upper: range.upper - low };
+        let rounding = hull(std::array::from_fn(|j| corners[j].value - told[j]));
+        let size = at.cell.size();
+        if corners.iter().all(|corner| corner.certain) && (at.side.is_some() || self.surface.side_changes_at_surface_only()) {
+            known = known.intersection(rounding.widen(0.5 * size.length() * (1.0 + 1e-12)));
+        }
+        if let Some(side) = at.side {
+            // 1, and 2 for the feet of centre and corners.
+            let distances = corners.map(|corner| corner.value.abs());
+            let (least, square) = (ends(&distances).0, spread(&distances, size.x));
+            let below = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
+            let reach = |foot: DVec3| (0..8).map(|j| (corners[j].point - foot).length() - distances[j]).fold(0.0, f64::max);
+            let above = corners.iter().map(|corner| reach(corner.foot)).fold(reach(at.center.foot), f64::min);
+            known = known.intersection(signed(side, Interval { lower: -below, upper: above }).plus(rounding));
+        }
+        known.widen(self.slack(at))
+    }
+
+    /// Sharpens `known` by the triangles of the list, until it is within `limit`. Also returns how fast the distance less
+    /// some affine function can change, at most 1.
+    pub fn fine(&self, at: &At<'_>, known: Interval, limit: f64) -> (Interval, f64) {
+        let (mut known, mut turn) = (known, 1.0);
+        if at.list.len() <= PLANES
+            && at.corners.iter().all(|corner| corner.certain)
+            && let Some((found, found_turn)) = self.by_planes(at)
+        {
+            known = known.intersection(found.widen(self.slack(at)));
+            turn = found_turn;
+            if known.upper.max(-known.lower) <= limit {
+                return (known, turn);
+            }
+        }
+        match at.side {
+            Some(side) if at.list.len() <= SHORT && !at.list.is_empty() => {
+                let told = at.told.map(|v| side.sign() * v);
+                (known.intersection(signed(side, self.by_triangles(at, &told)).widen(self.slack(at))), turn)
+            }
+            _ => (known, turn),
+        }
+    }
+
+    /// 5: contains the distance minus what is told, which differ by what `differences` hold at samples `spacing` apart.
+    pub fn by_samples(&self, at: &At<'_>, differences: Interval, spacing: f64, turn: f64) -> Interval {
+        differences.widen(turn * 0.75f64.sqrt() * spacing * (1.0 + 1e-12) + self.slack(at))
+    }
+
+    /// 2 and 3: contains the unsigned distance minus the interpolation of `told`.
+    fn by_triangles(&self, at: &At<'_>, told: &[f64; 8]) -> Interval {
+        let tree = self.surface.tree();
+        let center = at.cell.center();
+        let places: [DVec3; 8] = std::array::from_fn(|j| at.cell.corner(j));
+        let mut found = Interval { lower: f64::INFINITY, upper: f64::INFINITY };
+        for &slot in at.list {
+            let facet = tree.facet_at(slot);
+            let above = (0..8).map(|j| facet.distance_squared(places[j]).sqrt() - told[j]).fold(f64::NEG_INFINITY, f64::max);
+            let foot = facet.nearest(center);
+            let distance = foot.distance_squared.sqrt();
+            let slope = (center - foot.point) / distance;
+            // On the triangle there is no tangent; zero is below.
+            let (base, slope) = if distance > 0.0 { (distance, slope) } else { (0.0, DVec3::ZERO) };
+            let below = (0..8).map(|j| base + slope.dot(places[j] - center) - told[j]).fold(f64::INFINITY, f64::min);
+            found = Interval { lower: found.lower.min(below), upper: found.upper.min(above) };
+        }
+        found
+    }
+
+    /// 4 and 5: contains the signed distance minus the interpolation, and how fast its direction leaves the mean; `None`
+    /// where the surface is not known to be sound.
+    fn by_planes(&self, at: &At<'_>) -> Option<(Interval, f64)> {
+        let (mut mean, mut turned) = (DVec3::ZERO, 0.0f64);
+        let (mut found, mut farthest) = (Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY }, 0.0f64);
+        let mut normals = [DVec3::ZERO; PLANES];
+        for (&slot, normal) in at.list.iter().zip(&mut normals) {
+            let (plane, apart) = self.plane(at, slot)?;
+            *normal = plane.normal;
+            (mean, turned) = (mean + plane.normal, turned.max(apart));
+            found = found.hull(hull(std::array::from_fn(|j| plane.heights[j] - at.told[j])));
+            farthest = plane.heights.iter().fold(farthest, |far, height| far.max(height.abs()));
+        }
+        let mean = mean.normalize_or_zero();
+        let cosine = normals[..at.list.len()].iter().map(|normal| normal.dot(mean)).fold(1.0, f64::min);
+        // With room for edges that meet but for rounding.
+        let cosine = cosine - 2.0 * turned - 1e-12;
+        if !(cosine > 0.5) {
+            return None;
+        }
+        let turn = (2.0 - 2.0 * cosine).sqrt();
+        let twice = 2.0 * cosine * cosine - 1.0;
+        let found = if twice > 0.5 { found.widen(farthest * (1.0 / twice - 1.0)) } else { Interval::ALL };
+        let differences = hull(std::array::from_fn(|j| at.corners[j].value - at.told[j]));
+        Some((found.intersection(self.by_samples(at, differences, at.cell.size().x, turn)), turn))
+    }
+
+    /// The plane of a triangle around which the surface is whole, and an angle for what keeps its edges from meeting.
+    fn plane(&self, at: &At<'_>, slot: Slot) -> Option<(Plane, f64)> {
+        let tree = self.surface.tree();
+        let facet = tree.facet_at(slot);
+        let apart = self.surface.whole(tree.triangle(slot), at.range.upper)?;
+        let cross = facet.ab.cross(facet.ac);
+        let longest = facet.ab.length_squared().max(facet.ac.length_squared()).max((facet.ac - facet.ab).length_squared()).sqrt();
+        let height = cross.length() / longest;
+        if !(height > FLAT * longest) {
+            return None;
+        }
+        let normal = cross / cross.length();
+        let heights = std::array::from_fn(|j| normal.dot(at.cell.corner(j) - facet.a));
+        Some((Plane { normal, heights }, apart / height))
+    }
+
+    /// Rounding of lengths within the cell and the surface.
+    fn slack(&self, at: &At<'_>) -> f64 {
+        let tree = self.surface.tree();
+        // A normal of the flattest triangle that is relied on is off by 1e-9; a cell's list may reach across the surface.
+        let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(at.cell.min.abs()).max(at.cell.max.abs()).max_element();
+        128.0 * f64::EPSILON * reach + 1e-9 * at.cell.radius()
+    }
+}
+
+/// At least |p|^2 less its interpolation, less what the interpolation of the squared distances is above the square of theirs.
+///
+/// The latter is a variance, that of the part that is affine, with slopes b, less that of the rest: for coordinates t in a
+/// cell of edge h, sum of (1 - b^2) h^2 t (1 - t) and a rest that is small where the distances are nearly affine.
+fn spread(distances: &[f64; 8], edge: f64) -> f64 {
+    let mean = distances.iter().sum::<f64>() / 8.0;
+    let side = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -0.5 } else { 0.5 };
+    let slopes: [f64; 3] = std::array::from_fn(|axis| (0..8).map(|corner| distances[corner] * side(corner, axis)).sum::<f64>() / 2.0);
+    let affine = |corner: usize| mean + (0..3).map(|axis| slopes[axis] * side(corner, axis)).sum::<f64>();
+    let rest = (0..8).map(|corner| (distances[corner] - affine(corner)).abs()).fold(0.0, f64::max);
+    // Weighted deviations of the affine part are at most half its range.
+    let range: f64 = 0.5 * slopes.iter().map(|slope| slope.abs()).sum::<f64>();
+    let square = slopes.iter().map(|slope| (edge * edge - slope * slope).max(0.0)).sum::<f64>() / 4.0 + 2.0 * range * rest;
+    square.min(0.75 * edge * edge) * (1.0 + 1e-12)
+}
+
+fn ends(values: &[f64; 8]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+}
+
+fn hull(values: [f64; 8]) -> Interval {
+    let (lower, upper) = ends(&values);
+    Interval { lower, upper }
+}
+
+/// Of unsigned distances on one side.
+fn signed(side: Side, unsigned: Interval) -> Interval {
+    if side.sign() < 0.0 { Interval { lower: -unsigned.upper, upper: -unsigned.lower } } else { unsigned }
+}

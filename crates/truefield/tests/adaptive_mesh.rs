@@ -1,0 +1,132 @@
+//! Trees of meshes: bounds against the surface itself, whose answers have the bits of brute force.
+
+mod nasty;
+
+use std::sync::Arc;
+
+use nasty::{corpus, shapes};
+use truefield::build::adaptive::{Leaves, Rule, Rules, adaptive, adaptive_mesh, root};
+use truefield::field::adaptive::{AdaptiveField, Division, Leaf};
+use truefield::laws::{Random, places};
+use truefield::{Aabb, Distance, Run, SignChoice, Surface, TriangleMesh};
+
+fn surface(mesh: TriangleMesh) -> Arc<Surface> {
+    Arc::new(Surface::new(Arc::new(mesh), SignChoice::Auto, &Run::with_threads(2)).expect("a surface"))
+}
+
+fn build(surface: &Arc<Surface>, leaves: Leaves, rules: &Rules, threads: usize) -> AdaptiveField {
+    let place = root(&**surface, None, Division::Octree).expect("a box");
+    adaptive_mesh(surface, place, leaves, rules, &Run::with_threads(threads))
+        .unwrap_or_else(|error| panic!("{error} {:?}", surface.mesh().extent()))
+}
+
+/// Rules relative to the size of the part.
+fn rules(surface: &Surface, tolerance: f64, max_depth: u32, growth: f64, rule: Rule) -> Rules {
+    Rules { rule, growth, max_depth, ..Rules::within(tolerance * surface.mesh().extent().diagonal()) }
+}
+
+fn holds(name: &str, field: &AdaptiveField, surface: &Surface, rules: &Rules, count: usize) {
+    let run = Run::with_threads(2);
+    let mut random = Random::new(11);
+    let mut points = places(surface.mesh(), count, 5);
+    points.extend((0..count).map(|_| random.within(&field.extent_box().grow(0.1 * field.extent_box().size().x))));
+    let truth = surface.bounds(&points, &run).expect("answers");
+    let found = field.bounds(&points, &run).expect("answers");
+    let said = field.distances(&points, &run).expect("answers");
+    for (i, &p) in points.iter().enumerate() {
+        let (truth, found, said) = (truth[i], found[i], said[i]);
+        let inside = found.lower <= truth.lower && truth.upper <= found.upper;
+        assert!(inside, "{name}: {truth:?} at {p:?} is not in {found:?}, {rules:?}");
+        let Some(leaf) = field.find(p) else { continue };
+        assert!(
+            leaf.over().lower <= truth.lower && truth.upper <= leaf.over().upper,
+            "{name}: {truth:?} at {p:?} is not in {:?}",
+            leaf.over()
+        );
+        if matches!(leaf.leaf(), Leaf::Exact(_)) {
+            assert!(found == truth && truth.contains(said), "{name}: {found:?} at {p:?} is not {truth:?}");
+        } else if rules.rule == Rule::Verified && leaf.depth() < rules.max_depth && truth.width() == 0.0 {
+            let allowed = rules.tolerance + if rules.growth.is_finite() { rules.growth * truth.lower.abs() } else { f64::INFINITY };
+            assert!((said - truth.lower).abs() <= allowed * (1.0 + 1e-6), "{name}: {said} at {p:?} is not {truth:?}");
+        }
+    }
+    let mut cell = field.root();
+    for _ in 0..2000 {
+        let part = Aabb::new(random.within(&field.extent_box()), random.within(&field.extent_box()));
+        let part = Aabb::around([part.min, part.max]);
+        let p = random.within(&part);
+        let (range, truth) = (field.over(&part), surface.at(p));
+        assert!(range.lower <= truth.lower && truth.upper <= range.upper, "{name}: {truth:?} at {p:?} is not in {range:?} over {part:?}");
+        cell = if cell.is_leaf() { field.root() } else { cell.child(random.below(8) as usize) };
+        let p = random.within(&cell.extent());
+        let (range, truth) = (cell.over(), surface.at(p));
+        assert!(range.lower <= truth.lower && truth.upper <= range.upper, "{name}: {truth:?} at {p:?} is not in {range:?}, an inner cell");
+    }
+}
+
+#[test]
+fn bounds_hold_the_truth_of_every_nasty_mesh() {
+    for nasty in corpus() {
+        let surface = surface(nasty.mesh.clone());
+        if surface.mesh().extent().diagonal() > 1e38 {
+            let place = root(&*surface, None, Division::Octree).expect("a box");
+            let error = adaptive_mesh(&surface, place, Leaves::Linear, &Rules::within(1.0), &Run::default()).expect_err("too large");
+            assert!(error.to_string().contains("scale it down"));
+            continue;
+        }
+        for (leaves, rule, growth) in
+            [(Leaves::Linear, Rule::Verified, 0.1), (Leaves::Linear, Rule::Samples, f64::INFINITY), (Leaves::Exact, Rule::Verified, 0.0)]
+        {
+            let rules = rules(&surface, 0.01, 5, growth, rule);
+            holds(nasty.name, &build(&surface, leaves, &rules, 2), &surface, &rules, 4000);
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_close_to_smooth_sharp_and_rough_surfaces() {
+    let parts = [
+        ("a ball", shapes::icosphere(4)),
+        ("a torus", shapes::torus(60, 30, 1.0, 0.35)),
+        ("a rough scan", shapes::scan(60, 60, 3)),
+        ("a star", shapes::star(7, 0.5, 0.4)),
+    ];
+    for (name, soup) in parts {
+        let surface = surface(shapes::welded(&soup));
+        for (rule, growth) in [(Rule::Verified, 0.0), (Rule::Verified, 0.05), (Rule::Samples, 0.05)] {
+            let rules = rules(&surface, 2e-3, 7, growth, rule);
+            holds(name, &build(&surface, Leaves::Linear, &rules, 2), &surface, &rules, 60_000);
+        }
+    }
+}
+
+#[test]
+fn triangles_prove_more_than_the_mesh_as_any_shape() {
+    let surface = surface(shapes::welded(&shapes::cube()));
+    let rules = rules(&surface, 1e-2, 8, 0.05, Rule::Verified);
+    let by_triangles = build(&surface, Leaves::Linear, &rules, 2).statistics().leaves;
+    let place = root(&*surface, None, Division::Octree).expect("a box");
+    let by_values = adaptive(&*surface, place, &rules, &Run::default()).expect("a field").statistics().leaves;
+    assert!(by_triangles * 2 < by_values, "{by_triangles} leaves and {by_values}");
+}
+
+#[test]
+fn trees_are_the_same_for_any_number_of_threads() {
+    let surface = surface(shapes::welded(&shapes::scan(30, 30, 3)));
+    for leaves in [Leaves::Linear, Leaves::Exact] {
+        let rules = rules(&surface, 5e-3, 7, 0.1, Rule::Verified);
+        let one = build(&surface, leaves, &rules, 1).to_levels();
+        for threads in [2, 3, 7] {
+            assert!(build(&surface, leaves, &rules, threads).to_levels() == one);
+        }
+    }
+}
+
+#[test]
+fn too_fine_a_tree_is_refused_and_says_what_to_do() {
+    let surface = surface(shapes::welded(&shapes::icosphere(4)));
+    let place = root(&*surface, None, Division::Octree).expect("a box");
+    let rules = Rules { memory: 4 << 20, ..Rules::within(1e-5) };
+    let error = adaptive_mesh(&surface, place, Leaves::Linear, &rules, &Run::default()).expect_err("too fine").to_string();
+    assert!(error.contains("MiB") && error.contains("larger tolerance"), "{error}");
+}
