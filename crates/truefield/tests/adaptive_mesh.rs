@@ -57,7 +57,7 @@ fn holds(name: &str, field: &AdaptiveField, surface: &Surface, rules: &Rules, co
         let p = random.within(&part);
         let (range, truth) = (field.over(&part), surface.at(p));
         assert!(range.lower <= truth.lower && truth.upper <= range.upper, "{name}: {truth:?} at {p:?} is not in {range:?} over {part:?}");
-        cell = if cell.is_leaf() { field.root() } else { cell.child(random.below(8) as usize) };
+        cell = if cell.is_leaf() { field.root() } else { cell.child(random.below(8)) };
         let p = random.within(&cell.extent());
         let (range, truth) = (cell.over(), surface.at(p));
         assert!(range.lower <= truth.lower && truth.upper <= range.upper, "{name}: {truth:?} at {p:?} is not in {range:?}, an inner cell");
