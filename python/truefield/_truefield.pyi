@@ -434,6 +434,19 @@ class AdaptiveField:
         threads: int | None = None,
         progress: _Progress = None,
     ) -> AdaptiveField: ...
+    @staticmethod
+    def of_surface(
+        surface: Surface,
+        tolerance: float,
+        growth: float,
+        max_depth: int,
+        domain: tuple[list[float], list[float]] | None,
+        method: str,
+        rule: str,
+        memory: int,
+        threads: int | None = None,
+        progress: _Progress = None,
+    ) -> AdaptiveField: ...
     @property
     def extent(self) -> tuple[list[float], list[float]]: ...
     def statistics(self) -> dict[str, int]: ...

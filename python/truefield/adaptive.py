@@ -12,7 +12,7 @@ from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
 from truefield.csg import mesh as as_shape
 from truefield.errors import TruefieldError
-from truefield.fields import Part
+from truefield.fields import Part, Surface
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
 from truefield.shape import Shape
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 
-Reconstruction = Literal["linear", "cubic"]
+Method = Literal["linear", "cubic", "exact"]
 Rule = Literal["verified", "samples"]
 Crossing = Literal["linear", "cubic"]
 
@@ -54,11 +54,17 @@ class AdaptiveField:
     Made by `adaptive_field`.
     """
 
-    __slots__ = ("_native",)
+    __slots__ = ("_native", "_shape")
 
-    def __init__(self, native: _truefield.AdaptiveField) -> None:
-        """For makers of fields: the compiled field."""
+    def __init__(self, native: _truefield.AdaptiveField, shape: Shape | None = None) -> None:
+        """For makers of fields: the compiled field, and what it is of, where that is known."""
         self._native = native
+        self._shape = shape
+
+    @property
+    def shape(self) -> Shape | None:
+        """What the field was made of; None for one that was loaded."""
+        return self._shape
 
     @property
     def extent(self) -> tuple[Floats, Floats]:
@@ -148,7 +154,8 @@ class AdaptiveField:
         Args:
             distance: model units, negative inside.
             shape: the part or shape that the field is of: it is asked for exact crossings and normals, and sharp edges
-                and corners are kept. Without it they are rounded within the field's error.
+                and corners are kept. `AdaptiveField.shape` by default; where that is None they are rounded within the
+                field's error.
             memory: refuse to take more bytes than this; half the machine's memory by default.
             threads: worker threads; the mesh never depends on them.
             progress: called as `progress(phase, fraction)`.
@@ -163,7 +170,8 @@ class AdaptiveField:
             TruefieldError: no corner of a cell is below `distance`.
             MemoryError: the mesh does not fit.
         """
-        native = None if shape is None else _shape(shape)._native
+        of = self._shape if shape is None else _shape(shape)
+        native = None if of is None else of._native
         vertices, triangles, low, high = _truefield.adaptive_surface(
             self._native,
             arguments.number("distance", distance),
@@ -188,12 +196,12 @@ class AdaptiveField:
 
 def adaptive_field(
     part: Part | Shape,
-    tolerance: float,
+    tolerance: float | None = None,
     *,
     growth: float = 0.05,
     max_depth: int | None = None,
     domain: tuple[ArrayLike, ArrayLike] | None = None,
-    method: Reconstruction = "linear",
+    method: Method = "linear",
     rule: Rule = "verified",
     memory: int | None = None,
     threads: int | None = None,
@@ -203,15 +211,18 @@ def adaptive_field(
 
     Args:
         part: a mesh, a Surface or a Shape.
-        tolerance: the largest error at the surface, model units.
+        tolerance: the largest error at the surface, model units. Exact leaves have none: they do without, and edits of
+            them then keep to a thousandth of the part's longest side.
         growth: how much the error may grow per unit of distance from the surface; infinite divides only cells that
             meet it.
-        max_depth: no cell is divided at this depth, whatever its error; 24 by default.
+        max_depth: no cell is divided at this depth, whatever its error; 24 by default, 20 for meshes.
         domain: lowest and highest corner of the box to cover; the part's box with an eighth on all sides by default.
             The tree is a cube around it.
-        method: "linear" interpolates eight corners, "cubic" 64 samples where eight are not enough.
-        rule: "verified" divides until the error is proven, "samples" until the paper's 19 samples agree. `bounds` are
-            proven with both.
+        method: "linear" interpolates eight corners, "cubic" 64 samples where eight are not enough; "exact", for meshes,
+            keeps the triangles that can be nearest (the complete field of Huang et al. 2001 inside the tree), and its
+            answers are exact.
+        rule: "verified" divides until the error is proven; "samples" until the paper's 19 samples agree: quicker, with
+            several times fewer leaves on scanned parts. `bounds` are proven with both.
         memory: refuse to take more bytes than this; half the machine's memory by default.
         threads: worker threads; the field never depends on them.
         progress: called as `progress(phase, fraction)`.
@@ -224,19 +235,25 @@ def adaptive_field(
     if domain is not None:
         low, high = (arguments.points(corner)[0].tolist() for corner in domain)
         box = (low, high)
-    native = _truefield.AdaptiveField(
-        _shape(part)._native,
-        arguments.length("tolerance", tolerance),
-        arguments.number("growth", growth),
-        _DEEPEST if max_depth is None else arguments.count("max_depth", max_depth, least=0),
-        box,
-        method,
-        rule,
-        arguments.memory(memory),
-        threads,
-        progress,
-    )
-    return AdaptiveField(native)
+    deepest = _DEEPEST if max_depth is None else arguments.count("max_depth", max_depth, least=0)
+    surface = Surface(part, threads=threads, progress=progress) if isinstance(part, TriangleMesh) else part
+    if tolerance is None:
+        if method != "exact" or not isinstance(surface, Surface):
+            raise TruefieldError("adaptive_field needs a tolerance: the largest error at the surface, in model units")
+        low, high = surface.mesh.extent
+        tolerance = 1e-3 * float(np.max(high - low))
+    error, slope = arguments.length("tolerance", tolerance), arguments.number("growth", growth)
+    room = arguments.memory(memory)
+    shape = _shape(surface)
+    if isinstance(surface, Surface) and method != "cubic":
+        native = _truefield.AdaptiveField.of_surface(
+            surface._native, error, slope, deepest, box, method, rule, room, threads, progress
+        )
+    else:
+        native = _truefield.AdaptiveField(
+            shape._native, error, slope, deepest, box, method, rule, room, threads, progress
+        )
+    return AdaptiveField(native, shape)
 
 
 def _shape(part: Part | Shape) -> Shape:

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truefield::build::adaptive::{Reconstruction, Rule, Rules, adaptive, root};
+use truefield::build::adaptive::{Leaves, Reconstruction, Rule, Rules, adaptive, adaptive_mesh, root};
 use truefield::field::adaptive::{AdaptiveField, Division};
 use truefield::product::raycast::Caster;
 use truefield::{Aabb, Error, Run};
@@ -13,7 +13,7 @@ use truefield::{Aabb, Error, Run};
 use crate::convert::{column, points, rows};
 use crate::door::{job, raise};
 use crate::shape::PyShape;
-use crate::surface::interval_arrays;
+use crate::surface::{PySurface, interval_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -49,8 +49,13 @@ fn reconstruction(name: &str) -> PyResult<Reconstruction> {
     match name {
         "linear" => Ok(Reconstruction::Linear),
         "cubic" => Ok(Reconstruction::Cubic),
-        _ => Err(raise(Error::invalid(format!("method is {name:?}; choose \"linear\" or \"cubic\"")))),
+        "exact" => Err(raise(Error::invalid("method \"exact\" is for meshes; choose \"linear\" or \"cubic\" for a shape"))),
+        _ => Err(unknown_method(name)),
     }
+}
+
+fn unknown_method(name: &str) -> PyErr {
+    raise(Error::invalid(format!("method is {name:?}; choose \"linear\", \"cubic\" or \"exact\"")))
 }
 
 fn rule(name: &str) -> PyResult<Rule> {
@@ -83,6 +88,34 @@ impl PyAdaptiveField {
         let source = Arc::clone(&shape.0);
         let field = job(py, threads, progress, |run| adaptive(&*source, root(&*source, domain, Division::Octree)?, &rules, run))?;
         Ok(Self::of(field))
+    }
+
+    /// The field of a mesh, from its triangles: "linear" or "exact" leaves.
+    #[staticmethod]
+    #[pyo3(signature = (surface, tolerance, growth, max_depth, domain, method, rule, memory, threads=None, progress=None))]
+    fn of_surface(
+        py: Python<'_>,
+        surface: &PySurface,
+        tolerance: f64,
+        growth: f64,
+        max_depth: u32,
+        domain: Option<([f64; 3], [f64; 3])>,
+        method: &str,
+        rule: &str,
+        memory: u64,
+        threads: Option<usize>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let rules = Rules { tolerance, growth, max_depth, rule: self::rule(rule)?, reconstruction: Reconstruction::Linear, memory };
+        let leaves = match method {
+            "linear" => Leaves::Linear,
+            "exact" => Leaves::Exact,
+            _ => return Err(unknown_method(method)),
+        };
+        let domain = domain.map(|(low, high)| Aabb::new(low.into(), high.into()));
+        let source = &surface.0;
+        let made = job(py, threads, progress, |run| adaptive_mesh(source, root(&**source, domain, Division::Octree)?, leaves, &rules, run));
+        Ok(Self::of(made?))
     }
 
     /// Lowest and highest corner of the domain.

@@ -1,0 +1,111 @@
+"""Adaptive fields in Python: of meshes and of shapes, exact and interpolated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import truefield as tf
+from truefield import csg
+
+
+def _points(field: tf.AdaptiveField, count: int = 50_000) -> np.ndarray:
+    low, high = field.extent
+    return np.random.default_rng(4).uniform(low - 0.1 * (high - low), high + 0.1 * (high - low), (count, 3))
+
+
+@pytest.fixture(scope="module")
+def part() -> tf.TriangleMesh:
+    return tf.shapes.box((4.0, 3.0, 2.0))
+
+
+@pytest.mark.parametrize("method", ["linear", "cubic", "exact"])
+@pytest.mark.parametrize("rule", ["verified", "samples"])
+def test_bounds_of_a_part_hold_its_distances(part: tf.TriangleMesh, method: str, rule: str) -> None:
+    field = tf.adaptive_field(part, 0.02, growth=0.1, max_depth=6, method=method, rule=rule)  # type: ignore[arg-type]
+    points = _points(field)
+    truth = tf.Surface(part).distance(points)
+    lower, upper = field.bounds(points)
+    assert (lower <= truth).all()
+    assert (truth <= upper).all()
+    said = field.distance(points)
+    low, high = field.extent
+    inside = ((points >= low) & (points <= high)).all(axis=1)
+    assert np.isnan(said[~inside]).all()
+    if method == "exact":
+        assert np.array_equal(said[inside], truth[inside])
+        assert field.statistics()["exact"] == field.statistics()["leaves"]
+    if method == "linear" and rule == "verified":
+        near = inside & (np.abs(truth) < 0.05)
+        assert np.abs(said - truth)[near].max() < 0.2
+
+
+def test_tolerance_holds_at_the_surface_and_grows_away_from_it(part: tf.TriangleMesh) -> None:
+    field = tf.adaptive_field(part, 0.01, growth=0.05)
+    points = _points(field)
+    said, truth = field.distance(points), tf.Surface(part).distance(points)
+    inside = np.isfinite(said)
+    assert (np.abs(said - truth)[inside] <= 0.01 + 0.05 * np.abs(truth[inside]) + 1e-9).all()
+
+
+def test_a_shape_and_its_mesh_make_fields_of_one_solid(part: tf.TriangleMesh) -> None:
+    one = tf.adaptive_field(part, 0.01, domain=((-3, -3, -3), (5, 5, 5)))
+    low, high = part.extent
+    other = tf.adaptive_field(csg.box((4.0, 3.0, 2.0), center=(low + high) / 2), 0.01, domain=((-3, -3, -3), (5, 5, 5)))
+    points = _points(one)
+    lower, upper = one.bounds(points)
+    low, high = other.bounds(points)
+    assert (np.maximum(lower, low) <= np.minimum(upper, high)).all()
+
+
+def test_exact_fields_need_no_tolerance_and_others_do(part: tf.TriangleMesh) -> None:
+    assert tf.adaptive_field(part, method="exact").statistics()["exact"] > 0
+    with pytest.raises(tf.TruefieldError, match="needs a tolerance"):
+        tf.adaptive_field(part)
+    with pytest.raises(tf.TruefieldError, match="is for meshes"):
+        tf.adaptive_field(csg.sphere(1.0), 0.1, method="exact")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"tolerance": -1.0}, "tolerance"),
+        ({"tolerance": np.nan}, "tolerance"),
+        ({"growth": -0.5}, "growth"),
+        ({"growth": np.nan}, "growth"),
+        ({"max_depth": 99}, "max_depth"),
+        ({"method": "quartic"}, "method"),
+        ({"rule": "hope"}, "rule"),
+        ({"domain": ((1, 1, 1), (0, 0, 0))}, "domain"),
+        ({"threads": 0}, "threads"),
+    ],
+)
+def test_wrong_arguments_get_a_sentence(part: tf.TriangleMesh, arguments: dict[str, object], message: str) -> None:
+    with pytest.raises(tf.TruefieldError, match=message):
+        tf.adaptive_field(part, **{"tolerance": 0.1, **arguments})  # type: ignore[arg-type]
+    if message != "threads":
+        with pytest.raises(tf.TruefieldError, match=message):
+            tf.adaptive_field(csg.sphere(1.0), **{"tolerance": 0.1, **arguments})  # type: ignore[arg-type]
+
+
+def test_what_does_not_fit_is_refused_before_it_is_built(part: tf.TriangleMesh) -> None:
+    for shape in (part, csg.sphere(1.0)):
+        with pytest.raises(MemoryError, match="larger tolerance"):
+            tf.adaptive_field(shape, 1e-6, memory=2**22)
+
+
+def test_progress_is_told_and_can_stop() -> None:
+    def stop(phase: str, fraction: float) -> None:
+        assert phase
+        assert 0.0 <= fraction <= 1.0
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        tf.adaptive_field(csg.sphere(1.0), 1e-6, progress=stop)
+
+
+def test_any_number_of_threads_makes_the_same_field(part: tf.TriangleMesh) -> None:
+    points = _points(tf.adaptive_field(part, 0.1))
+    for method in ("linear", "exact"):
+        fields = [tf.adaptive_field(part, 0.01, method=method, threads=n) for n in (1, 2, 5)]  # type: ignore[arg-type]
+        first, *others = (np.stack(field.bounds(points)) for field in fields)
+        assert all(np.array_equal(first, other) for other in others)
