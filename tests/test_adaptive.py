@@ -50,7 +50,9 @@ def test_tolerance_holds_at_the_surface_and_grows_away_from_it(part: tf.Triangle
 def test_a_shape_and_its_mesh_make_fields_of_one_solid(part: tf.TriangleMesh) -> None:
     one = tf.adaptive_field(part, 0.01, domain=((-3, -3, -3), (5, 5, 5)))
     low, high = part.extent
-    other = tf.adaptive_field(csg.box((4.0, 3.0, 2.0), center=(low + high) / 2), 0.01, domain=((-3, -3, -3), (5, 5, 5)))
+    other = tf.adaptive_field(
+        csg.box((4.0, 3.0, 2.0), center=((low + high) / 2).tolist()), 0.01, domain=((-3, -3, -3), (5, 5, 5))
+    )
     points = _points(one)
     lower, upper = one.bounds(points)
     low, high = other.bounds(points)
@@ -106,6 +108,6 @@ def test_progress_is_told_and_can_stop() -> None:
 def test_any_number_of_threads_makes_the_same_field(part: tf.TriangleMesh) -> None:
     points = _points(tf.adaptive_field(part, 0.1))
     for method in ("linear", "exact"):
-        fields = [tf.adaptive_field(part, 0.01, method=method, threads=n) for n in (1, 2, 5)]  # type: ignore[arg-type]
+        fields = [tf.adaptive_field(part, 0.01, method=method, threads=n) for n in (1, 2, 5)]
         first, *others = (np.stack(field.bounds(points)) for field in fields)
         assert all(np.array_equal(first, other) for other in others)
