@@ -1,6 +1,6 @@
 """Distance fields that people can trust: every distance comes with an interval that contains the truth."""
 
-from truefield import csg, implicit, shapes
+from truefield import csg, implicit, patches, shapes
 from truefield._truefield import __version__
 from truefield.adaptive import AdaptiveField, RayHits, adaptive_field
 from truefield.check import MeshCheck
@@ -46,6 +46,7 @@ __all__ = [
     "distance_transform",
     "implicit",
     "load",
+    "patches",
     "read",
     "read_points",
     "read_volume",

@@ -7,8 +7,8 @@
 ...     domain=((0, 0, 0), (6.2, 6.2, 6.2)),
 ... )
 
-A formula's values are no distances: `field` finds the true distance to where it vanishes, with proof. A function written
-in Python cannot be looked into: what `function` knows is how fast it changes.
+A formula's values are no distances: `field` finds the true distance to where it vanishes, with proof. A function
+written in Python cannot be looked into: what `function` knows is how fast it changes.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ mod door;
 mod field;
 mod implicit;
 mod marching;
+mod patch;
 mod products;
 mod render;
 mod sampled;
@@ -50,6 +51,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(marching::march_from, module)?)?;
     module.add_function(wrap_pyfunction!(marching::site_difference_of, module)?)?;
     module.add_function(wrap_pyfunction!(implicit::function_shape, module)?)?;
+    module.add_function(wrap_pyfunction!(patch::patch_shape, module)?)?;
     module.add_function(wrap_pyfunction!(store::parts_of, module)?)?;
     module.add_function(wrap_pyfunction!(store::field_of, module)?)?;
     module.add_function(wrap_pyfunction!(csg::sphere, module)?)?;

@@ -19,6 +19,9 @@ const FACETS: u32 = 24;
 /// Halvings of a patch that are kept; further ones are made when they are needed.
 const LEVELS: u32 = 6;
 
+/// Halvings beyond these that are tried for a whole cell.
+const FINER: u32 = 5;
+
 /// Pieces that one search makes at most.
 const MOST: usize = 20_000;
 
@@ -179,6 +182,31 @@ impl Patches {
         Found { lower, upper: upper + rounding, point }
     }
 
+    /// Whether searches from all points of a cell certainly end at once: near it, all pieces are simple.
+    fn is_simple(&self, cell: &Aabb, reach: f64) -> bool {
+        let square = reach * reach * (1.0 + 1e-12);
+        let near = |extent: &Aabb| (extent.min - cell.max).max(cell.min - extent.max).max(DVec3::ZERO).length_squared() <= square;
+        let mut pending = vec![self.nodes.len() - 1];
+        let mut halves: Vec<(Piece, u32)> = Vec::new();
+        while let Some(index) = pending.pop() {
+            match &self.nodes[index] {
+                node if !near(extent_of(node)) => {}
+                Node::Inner { children, .. } => pending.extend(children.iter().map(|&child| child as usize)),
+                Node::Leaf(piece) => halves.push(((**piece).clone(), FINER)),
+            }
+            while let Some((piece, levels)) = halves.pop() {
+                if !near(piece.extent()) || piece.is_simple(cell) {
+                    continue;
+                }
+                if levels == 0 {
+                    return false;
+                }
+                halves.extend(piece.halves().map(|half| (half, levels - 1)));
+            }
+        }
+        true
+    }
+
     /// -1 inside, 1 outside; `None` where that is not certain.
     fn side(&self, facets: &Facets, p: DVec3, found: Found) -> Option<f64> {
         let (mut at, mut lower, mut direction) = (p, found.lower, p - found.point);
@@ -225,19 +253,12 @@ impl Patches {
 
 impl Facets {
     fn new(patches: &[Bezier], run: &Run<'_>) -> Result<Self> {
-        let mut vertices: Vec<DVec3> = Vec::new();
-        let mut known: HashMap<[u64; 3], u32> = HashMap::new();
+        let size = Aabb::around(patches.iter().flat_map(Bezier::controls));
+        let mut weld = Weld { near: 1e-12 * (size.diagonal() + size.min.abs().max(size.max.abs()).max_element()), ..Weld::default() };
         let mut triangles = Vec::new();
         let mut error = 0.0_f64;
         for patch in patches {
-            let mut vertex = |i: u32, j: u32| {
-                let p = patch.point(f64::from(i) / f64::from(FACETS), f64::from(j) / f64::from(FACETS));
-                // Zeros of both signs are one place.
-                *known.entry(p.to_array().map(|c| (c + 0.0).to_bits())).or_insert_with(|| {
-                    vertices.push(p);
-                    (vertices.len() - 1) as u32
-                })
-            };
+            let mut vertex = |i: u32, j: u32| weld.vertex(patch.point(f64::from(i) / f64::from(FACETS), f64::from(j) / f64::from(FACETS)));
             for (i, j) in (0..FACETS * FACETS).map(|k| (k / FACETS, k % FACETS)) {
                 let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| vertex(i, j));
                 triangles.extend([[a, b, c], [a, c, d]].into_iter().filter(|[a, b, c]| a != b && b != c && a != c));
@@ -249,7 +270,8 @@ impl Facets {
         if triangles.is_empty() {
             return Err(Error::invalid("the patches have no area"));
         }
-        let surface = Surface::new(Arc::new(TriangleMesh::new(vertices, triangles)?), SignChoice::Auto, run)?;
+        let weld_error = weld.near;
+        let surface = Surface::new(Arc::new(TriangleMesh::new(weld.vertices, triangles)?), SignChoice::Auto, run)?;
         let rule = surface.sign_rule();
         if rule.kind != SignKind::Pseudonormal {
             return Err(Error::invalid(format!(
@@ -258,7 +280,32 @@ impl Facets {
                 rule.reason
             )));
         }
-        Ok(Self { surface, error: error * (1.0 + 1e-9) })
+        Ok(Self { surface, error: error * (1.0 + 1e-9) + 16.0 * weld_error })
+    }
+}
+
+/// Points of several patches that are one but for rounding.
+#[derive(Default)]
+struct Weld {
+    vertices: Vec<DVec3>,
+    cells: HashMap<[i64; 3], u32>,
+    near: f64,
+}
+
+impl Weld {
+    /// The number of a point, or of one known nearby.
+    fn vertex(&mut self, p: DVec3) -> u32 {
+        // What is near lies in the same cell, four times as wide, or just beyond its border.
+        let cell = |q: DVec3| (q / (4.0 * self.near)).floor().to_array().map(|c| c as i64);
+        let around = Aabb::new(p - self.near, p + self.near);
+        if let Some(&known) = (0..8).find_map(|corner| self.cells.get(&cell(around.corner(corner)))) {
+            return known;
+        }
+        let number = self.vertices.len() as u32;
+        let home = cell(p);
+        self.vertices.push(p);
+        self.cells.insert(home, number);
+        number
     }
 }
 
@@ -320,8 +367,17 @@ impl Source for Patches {
         Ok(())
     }
 
-    fn slack(&self, _: &Aabb) -> Interval {
-        Interval::around(0.0, self.noise())
+    fn slack(&self, cell: &Aabb) -> Interval {
+        let center = cell.center();
+        let (at, value) = self.answer(center);
+        let radius = cell.radius() * (1.0 + 1e-12);
+        let reach = at.upper.max(-at.lower) + radius;
+        if self.is_simple(cell, reach) {
+            return Interval::around(0.0, self.noise());
+        }
+        // Both change by no more than one moves.
+        let (value, moved) = (value.unwrap_or(0.0), 2.0 * radius + self.noise());
+        Interval { lower: at.lower - value - moved, upper: at.upper - value + moved }
     }
 
     /// A distance bends no more than that of a point.
