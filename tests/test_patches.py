@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-
 import truefield as tf
 from truefield import patches
 

@@ -1,8 +1,9 @@
-"""Surfaces of bicubic Bezier patches, with the closest point to 1e-11 of their size: `patches.surface`, `patches.teapot`."""
+"""Surfaces of bicubic Bezier patches, with the closest point to 1e-11 of their size."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Final, Literal
 
 import numpy as np
@@ -28,14 +29,15 @@ def surface(
     """The shape of bicubic Bezier patches.
 
     Args:
-        control_points: (n, 4, 4, 3) float64: of each patch, four along u of four along v. Patches that share an edge have the
-            same control points there. The normal, du x dv, points outward.
+        control_points: (n, 4, 4, 3) float64: of each patch, four along u of four along v. Patches that share an edge
+            have the same control points there. The normal, du x dv, points outward.
         sides: "closed": the patches close up and distances are negative inside. "unsigned": there is no inside and
             distances are positive, as for the paper's teapot, whose walls were made by an offset.
         threads: number of threads; all cores by default.
         progress: called as `progress(phase, fraction)`.
 
-    Points as far from a large part of the surface as from its nearest point, like the middle of a ball, have wider bounds.
+    Points as far from a large part of the surface as from its nearest point, like the middle of a ball, have wider
+    bounds.
 
     Raises:
         TruefieldError: the array has another shape or numbers that are not finite, or the patches do not close up;
@@ -51,19 +53,11 @@ def surface(
     return Shape(native, f"patches.surface({len(array)} patches)")
 
 
-def teapot() -> Shape:
-    """A teapot in the manner of the paper's, 3 units high: a round body with its lid, a handle and a spout, put together.
-
-    Its 68 patches are our own: profiles turned about the z axis, and tubes along curves in the x-z plane.
-    """
-    body, handle, spout = (surface(part) for part in teapot_patches())
-    return body | handle | spout
-
-
 def teapot_patches() -> tuple[Floats, Floats, Floats]:
-    """The control points, (n, 4, 4, 3) each, of the teapot's body with its lid, its handle and its spout.
+    """The control points, (n, 4, 4, 3) each, of a teapot in the manner of the paper's: body with lid, handle and spout.
 
-    Each part closes up by itself; handle and spout begin and end inside the body.
+    It is 3 units high. Its 68 patches are our own: profiles turned about the z axis, and tubes along curves in the x-z
+    plane. Each part closes up by itself; handle and spout begin and end inside the body.
     """
     return _body(), _handle(), _spout()
 
@@ -128,7 +122,7 @@ def _tube(spine: Floats, radii: list[float]) -> Floats:
             axis=1,
         )
         rings = []
-        for cubic, (first, last) in zip(spine, zip(radii[:-1], radii[1:], strict=True), strict=True):
+        for cubic, (first, last) in zip(spine, pairwise(radii), strict=True):
             # Rings stay square to the curve at both ends of a piece, so that pieces join smoothly.
             ways = [cubic[1] - cubic[0], cubic[1] - cubic[0], cubic[3] - cubic[2], cubic[3] - cubic[2]]
             columns = [
