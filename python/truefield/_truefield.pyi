@@ -404,10 +404,7 @@ class Expression:
 def function_shape(
     function: object, lipschitz: float, domain: tuple[list[float], list[float]] | None, values: str
 ) -> Shape: ...
-
-def patch_shape(
-    controls: _Floats, sides: str, threads: int | None = None, progress: _Progress = None
-) -> Shape: ...
+def patch_shape(controls: _Floats, sides: str, threads: int | None = None, progress: _Progress = None) -> Shape: ...
 
 class Shape:
     @staticmethod
