@@ -62,5 +62,17 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(products::collide_solids, module)?)?;
     module.add_function(wrap_pyfunction!(products::solid_extent, module)?)?;
     module.add_function(wrap_pyfunction!(products::draw_field, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::capsule, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::half_space, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::frustum, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::torus, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::ellipsoid, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::menger_sponge, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::molecule, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::union_of, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::intersection_of, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::difference_of, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::tube, module)?)?;
+    module.add_function(wrap_pyfunction!(csg::sweep, module)?)?;
     Ok(())
 }

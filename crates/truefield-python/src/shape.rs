@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
-use truefield::{Source, source};
+use truefield::source::csg::{self, BlendKind, Placement};
+use truefield::{DVec3, Error, Source, source};
 
 use crate::convert::{column, points, rows};
-use crate::door::job;
+use crate::door::{job, raise};
 use crate::surface::{PySurface, interval_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
@@ -21,6 +22,10 @@ impl PyShape {
     pub fn of(source: impl Source + 'static) -> Self {
         Self(Arc::new(source))
     }
+
+    fn placed(&self, placement: truefield::Result<Placement>) -> PyResult<Self> {
+        placement.and_then(|placement| csg::Placed::new(Arc::clone(&self.0), placement)).map(Self::of).map_err(raise)
+    }
 }
 
 #[pymethods]
@@ -29,6 +34,40 @@ impl PyShape {
     #[staticmethod]
     fn mesh(surface: &PySurface) -> Self {
         Self(Arc::clone(&surface.0) as Arc<dyn Source>)
+    }
+
+    /// What is not in the shape.
+    fn complement(&self) -> Self {
+        Self::of(csg::Complement::new(Arc::clone(&self.0)))
+    }
+
+    fn translate(&self, by: [f64; 3]) -> PyResult<Self> {
+        self.placed(Placement::translate(DVec3::from_array(by)))
+    }
+
+    fn rotate(&self, axis: [f64; 3], degrees: f64) -> PyResult<Self> {
+        self.placed(Placement::rotate(DVec3::from_array(axis), degrees))
+    }
+
+    fn scale(&self, factor: f64) -> PyResult<Self> {
+        self.placed(Placement::scale(factor))
+    }
+
+    fn offset(&self, distance: f64) -> PyResult<Self> {
+        csg::Offset::new(&self.0, distance).map(Self::of).map_err(raise)
+    }
+
+    fn shell(&self, thickness: f64) -> PyResult<Self> {
+        csg::shell(&self.0, thickness).map(Self::of).map_err(raise)
+    }
+
+    fn blend(&self, other: &Self, radius: f64, kind: &str) -> PyResult<Self> {
+        let kind = match kind {
+            "polynomial" => BlendKind::Polynomial,
+            "circular" => BlendKind::Circular,
+            _ => return Err(raise(Error::invalid(format!("kind is {kind:?}; choose \"circular\" or \"polynomial\"")))),
+        };
+        csg::Blend::new([&self.0, &other.0], radius, kind).map(Self::of).map_err(raise)
     }
 
     /// Lowest and highest corner, `None` where the shape has no end.

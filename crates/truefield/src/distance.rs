@@ -91,6 +91,11 @@ pub trait Source: Distance {
         false
     }
 
+    /// Whether the value has the sign of the distance everywhere, so that solids can be put together by values alone.
+    fn sided(&self) -> bool {
+        true
+    }
+
     /// No less than how far solving or rounding can move a value from one that changes by no more than one moves.
     fn noise(&self) -> f64 {
         0.0

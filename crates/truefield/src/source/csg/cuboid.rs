@@ -1,10 +1,10 @@
 //! Boxes along the axes, with sharp or round edges.
 
-use crate::distance::{Distance, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 
-use super::measure::{length, point, rounding};
+use super::exact::Exact;
+use super::measure::{convex, length, point};
 
 /// A box: all points within `rounding` of a core box.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,9 +38,26 @@ impl Cuboid {
         (p - self.center).abs() - self.core
     }
 
-    fn value(&self, p: DVec3) -> f64 {
-        let beyond = self.beyond(p);
+    fn total(&self, beyond: DVec3) -> f64 {
         beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0) - self.rounding
+    }
+
+    /// Least and greatest `beyond` over a box.
+    fn span(&self, cell: &Aabb) -> (DVec3, DVec3) {
+        let (low, high) = (cell.min - self.center, cell.max - self.center);
+        let least = low.max(-high).max(DVec3::ZERO);
+        (least - self.core, low.abs().max(high.abs()) - self.core)
+    }
+}
+
+impl Exact for Cuboid {
+    fn hull(&self) -> Option<Aabb> {
+        let half = self.core + self.rounding;
+        Some(Aabb::new(self.center - half, self.center + half))
+    }
+
+    fn value(&self, p: DVec3) -> f64 {
+        self.total(self.beyond(p))
     }
 
     fn slope(&self, p: DVec3) -> DVec3 {
@@ -52,66 +69,20 @@ impl Cuboid {
         DVec3::AXES[beyond.max_position()] * toward
     }
 
-    /// Least and greatest `beyond` over a box.
-    fn range(&self, cell: &Aabb) -> (DVec3, DVec3) {
-        let (low, high) = (cell.min - self.center, cell.max - self.center);
-        let least = low.max(-high).max(DVec3::ZERO);
-        (least - self.core, low.abs().max(high.abs()) - self.core)
-    }
-}
-
-impl Distance for Cuboid {
-    fn extent(&self) -> Option<Aabb> {
-        let half = self.core + self.rounding;
-        Some(Aabb::new(self.center - half, self.center + half))
-    }
-
-    fn at(&self, p: DVec3) -> Interval {
-        Interval::exact(self.value(p))
-    }
-
-    /// Exact: the value grows with each coordinate's way beyond its faces.
-    fn over(&self, cell: &Aabb) -> Interval {
-        let of = |beyond: DVec3| beyond.max(DVec3::ZERO).length() + beyond.max_element().min(0.0) - self.rounding;
-        let (low, high) = self.range(cell);
-        Interval { lower: of(low), upper: of(high) }.widen(self.noise())
-    }
-}
-
-impl Source for Cuboid {
-    fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
-        for (out, &p) in out.iter_mut().zip(points) {
-            *out = self.value(p);
-        }
-        Ok(())
-    }
-
-    fn gradients(&self, points: &[DVec3], out: &mut [DVec3]) -> Result<()> {
-        for (out, &p) in out.iter_mut().zip(points) {
-            *out = self.slope(p);
-        }
-        Ok(())
-    }
-
-    /// Nothing where one face is nearest all over the cell; beyond edges and corners a circle around them.
-    fn bend(&self, cell: &Aabb) -> Interval {
-        let (low, high) = self.range(cell);
+    /// Nothing where one face is nearest all over the cell; beyond edges and corners of the core a circle around them.
+    fn curving(&self, cell: &Aabb) -> Interval {
+        let (low, high) = self.span(cell);
         let face = (0..3).any(|axis| {
             let one_sided = cell.min[axis] >= self.center[axis] || cell.max[axis] <= self.center[axis];
             let others = high[(axis + 1) % 3].max(high[(axis + 2) % 3]);
             one_sided && others <= low[axis].min(0.0)
         });
-        let upper = if face {
-            0.0
-        } else if low.max_element() > 0.0 {
-            (1.0 + 1e-12) / low.max(DVec3::ZERO).length()
-        } else {
-            f64::INFINITY
-        };
-        Interval { lower: 0.0, upper }
+        if face { Interval::exact(0.0) } else { convex(low.max(DVec3::ZERO).length()) }
     }
 
-    fn noise(&self) -> f64 {
-        rounding(self.extent())
+    /// The least and the greatest distance: it grows with each coordinate's way beyond the faces.
+    fn range(&self, cell: &Aabb) -> Interval {
+        let (low, high) = self.span(cell);
+        Interval { lower: self.total(low), upper: self.total(high) }
     }
 }

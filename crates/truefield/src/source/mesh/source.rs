@@ -43,6 +43,10 @@ impl Source for Surface {
         if inside { Interval { lower: -most, upper: f64::INFINITY } } else { Interval { lower: f64::NEG_INFINITY, upper: most } }
     }
 
+    fn sided(&self) -> bool {
+        self.side_changes_at_surface_only() && self.signs.blur() == 0.0
+    }
+
     fn noise(&self) -> f64 {
         let extent = self.mesh.extent();
         ROUNDING * extent.min.abs().max(extent.max.abs()).max_element()

@@ -1,0 +1,200 @@
+//! Where the distance is, of a shape that is known by its values only.
+//!
+//! A value has the sign of the distance, vanishes on the surface and changes by no more than one moves. So the distance
+//! is at least as far from zero; and a point found on the other side says how far it is at most.
+
+use crate::distance::Source;
+use crate::geom::{Aabb, DVec3, Interval};
+
+/// Directions tried besides the gradient's.
+const AXES: [DVec3; 6] = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+
+/// Steps of a ray: enough to cross what is worth crossing.
+const STEPS: usize = 48;
+
+/// Rounds of turning a ray toward the nearest point of the plane that it met.
+const TURNS: usize = 6;
+
+/// The distance at `p`: exact where the gradient leads straight to the surface and out on its other side, else from the
+/// value to the nearest point that some rays find on the other side.
+pub fn at(shape: &dyn Source, p: DVec3) -> Interval {
+    let Some(asked) = Asked::new(shape, p) else { return Interval::ALL };
+    asked.interval()
+}
+
+/// [`Source::slack`] of a shape that is known by its values only.
+///
+/// Where the gradient has length 1, as `unit` says of boxes, the distance is the value wherever the slope does not jump
+/// between a cell and the surface.
+pub fn slack(shape: &dyn Source, cell: &Aabb, unit: impl Fn(&Aabb) -> bool) -> Interval {
+    let (center, radius) = (cell.center(), cell.radius() * (1.0 + 1e-9));
+    let Some(asked) = Asked::new(shape, center) else { return Interval::ALL };
+    if straight(&asked, cell, unit) {
+        return Interval::exact(0.0);
+    }
+    let (value, distance) = (asked.value, asked.interval());
+    let (clear, far) = (radius + asked.rounding, 2.0 * radius + asked.rounding);
+    // The distance is farther from zero than the value, on the same side of it.
+    Interval {
+        lower: if value > clear { 0.0 } else { (distance.lower - value).min(0.0) - far },
+        upper: if value < -clear { 0.0 } else { (distance.upper - value).max(0.0) + far },
+    }
+}
+
+/// Whether slopes do not jump in the box that holds a cell and the nearest points of the surface of all its points: then
+/// every point goes straight to the surface, along its gradient.
+fn straight(asked: &Asked<'_>, cell: &Aabb, unit: impl Fn(&Aabb) -> bool) -> bool {
+    let radius = cell.radius() * (1.0 + 1e-9);
+    let foot = asked.p - asked.gradient * asked.value;
+    let mut reach = radius;
+    // Nearest points spread as far as the slope turns over the way; the box that is looked at has to hold them.
+    for _ in 0..3 {
+        let whole = around(cell, foot, reach);
+        let bend = asked.shape.bend(&whole);
+        let most = bend.upper.max(-bend.lower);
+        if !most.is_finite() {
+            return false;
+        }
+        let way = asked.value.abs();
+        let spread = radius * (1.0 + (way + radius) * most) * (1.0 + 1e-9) + 1e-8 * way + 2.0 * asked.rounding;
+        if spread <= reach {
+            return unit(&whole);
+        }
+        reach = 1.5 * spread;
+    }
+    false
+}
+
+/// The box of a cell and a ball.
+fn around(cell: &Aabb, center: DVec3, radius: f64) -> Aabb {
+    cell.union(Aabb::new(center, center).grow(radius))
+}
+
+/// A shape asked at a point.
+struct Asked<'a> {
+    shape: &'a dyn Source,
+    p: DVec3,
+    value: f64,
+    gradient: DVec3,
+    /// What rounding and solving may do to values here.
+    rounding: f64,
+}
+
+impl<'a> Asked<'a> {
+    /// `None` where the shape cannot be asked.
+    fn new(shape: &'a dyn Source, p: DVec3) -> Option<Self> {
+        let (value, mut gradient) = (value(shape, p)?, [DVec3::ZERO]);
+        shape.gradients(&[p], &mut gradient).ok()?;
+        let rounding = shape.noise() + 64.0 * f64::EPSILON * (p.abs().max_element() + value.abs());
+        Some(Self { shape, p, value, gradient: gradient[0].normalize_or(DVec3::X), rounding })
+    }
+
+    /// Away from the side that the point is on.
+    fn across(&self) -> DVec3 {
+        if self.value < 0.0 { self.gradient } else { -self.gradient }
+    }
+
+    /// How far the way leads beyond the surface: 0 at it, positive on the other side.
+    fn beyond(&self, q: DVec3) -> Option<f64> {
+        value(self.shape, q).map(|value| if self.value < 0.0 { value } else { -value })
+    }
+
+    fn interval(&self) -> Interval {
+        let way = self.value.abs();
+        let solved = self.shape.noise();
+        if way <= self.rounding || self.leads_out() {
+            return Interval::around(self.value, if solved > ROUNDED * way { solved } else { 0.0 });
+        }
+        let most = self.farthest();
+        if self.value < 0.0 {
+            Interval { lower: -most, upper: self.value + solved }
+        } else {
+            Interval { lower: self.value - solved, upper: most }
+        }
+    }
+
+    /// Whether the gradient leads to the surface in just the way the value says, and out on the other side.
+    fn leads_out(&self) -> bool {
+        let (way, across) = (self.value.abs(), self.across());
+        let step = (1e-6 * way).max(1e3 * self.rounding);
+        let (Some(there), Some(past)) = (self.beyond(self.p + across * way), self.beyond(self.p + across * (way + step))) else {
+            return false;
+        };
+        there >= -4.0 * self.rounding && past >= 0.5 * step
+    }
+
+    /// The way to the nearest point that rays find on the other side; infinite where they find none.
+    fn farthest(&self) -> f64 {
+        let (mut best, mut end) = (f64::INFINITY, None);
+        for direction in std::iter::once(self.across()).chain(AXES) {
+            self.shorten(direction, &mut best, &mut end);
+        }
+        for _ in 0..TURNS {
+            let Some(q) = end else { break };
+            let mut normal = [DVec3::ZERO];
+            if self.shape.gradients(&[q], &mut normal).is_err() {
+                break;
+            }
+            let normal = normal[0].normalize_or_zero();
+            let toward = normal * (q - self.p).dot(normal);
+            let before = best;
+            for share in [1.0, 0.5, 0.2] {
+                self.shorten((q - self.p).lerp(toward, share).normalize_or_zero(), &mut best, &mut end);
+            }
+            if best > before * (1.0 - 1e-6) {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Keeps the end of a ray if it is nearer than the best so far.
+    fn shorten(&self, direction: DVec3, best: &mut f64, end: &mut Option<DVec3>) {
+        if direction != DVec3::ZERO
+            && let Some(way) = self.ray(direction, *best)
+        {
+            (*best, *end) = (way, Some(self.p + direction * way));
+        }
+    }
+
+    /// The way along a ray to the other side, if it is less than `limit`.
+    fn ray(&self, direction: DVec3, limit: f64) -> Option<f64> {
+        let (mut here, mut ahead) = (self.value.abs(), self.value.abs());
+        let least = 0.01 * here + 4.0 * self.rounding;
+        for step in 0..STEPS {
+            if !(ahead < limit) {
+                return None;
+            }
+            let beyond = self.beyond(self.p + direction * ahead)?;
+            if beyond > self.rounding {
+                return Some(self.first(direction, here, ahead));
+            }
+            here = ahead;
+            ahead += (-beyond).max(least * f64::from(1 + step as u32 / 8));
+        }
+        None
+    }
+
+    /// The end of a ray, back to where it crossed.
+    fn first(&self, direction: DVec3, mut here: f64, mut across: f64) -> f64 {
+        for _ in 0..20 {
+            let middle = 0.5 * (here + across);
+            if self.beyond(self.p + direction * middle).is_some_and(|beyond| beyond > self.rounding) {
+                across = middle;
+            } else {
+                here = middle;
+            }
+        }
+        across * (1.0 + 4.0 * f64::EPSILON)
+    }
+}
+
+/// Noise below this part of a distance is rounding.
+const ROUNDED: f64 = 1e-12;
+
+/// One value; `None` where the shape cannot be asked.
+pub fn value(shape: &dyn Source, p: DVec3) -> Option<f64> {
+    let mut out = [0.0];
+    shape.values(&[p], &mut out).ok()?;
+    Some(out[0]).filter(|value| !value.is_nan())
+}
