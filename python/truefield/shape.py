@@ -15,7 +15,7 @@ from truefield.fields import Surface
 from truefield.mesh import TriangleMesh
 
 Vector = Sequence[float] | Floats
-Axis = Union[Literal["x", "y", "z"], Vector]
+Axis = Literal["x", "y", "z"] | Sequence[float] | Floats
 Blend = Literal["circular", "polynomial"]
 Solid = Union["Shape", Surface, TriangleMesh]
 
@@ -26,11 +26,11 @@ _MOST_WRITTEN = 6
 class Shape:
     """A solid that answers distances; immutable. `truefield.csg` and `truefield.implicit` make them.
 
-    `a | b` and `a + b` are the union, `a & b` the intersection, `a - b` the difference, `~a` and `-a` all that is not in
-    a. A TriangleMesh or a Surface may stand for either, as `csg.mesh` makes a shape of it.
+    `a | b` and `a + b` are the union, `a & b` the intersection, `a - b` the difference, `~a` and `-a` all that is
+    not in a. A TriangleMesh or a Surface may stand for either, as `csg.mesh` makes a shape of it.
     """
 
-    __slots__ = ("_ball", "_cuts", "_native", "_parts", "_text")
+    __slots__ = ("_ball", "_cuts", "_native", "_parts", "_sum", "_text")
 
     def __init__(
         self, native: _truefield.Shape, text: str, *, ball: tuple[Floats, float] | None = None, sum: bool = False
@@ -45,6 +45,7 @@ class Shape:
         """
         self._native = native
         self._text = f"({text})" if sum else text
+        self._sum = sum
         self._ball = ball
         self._parts: tuple[Shape, ...] = (self,)
         self._cuts: tuple[Shape, tuple[Shape, ...]] = (self, ())
@@ -181,7 +182,7 @@ class Shape:
 
 
 def unite(shapes: Sequence[Shape]) -> Shape:
-    """The union of shapes; unions among them are taken apart, so that one after the other is as quick as all at once."""
+    """The union of shapes; unions among them are taken apart, so that one by one is as quick as all at once."""
     parts = tuple(part for one in shapes for part in one._parts)
     if len(parts) == 1:
         return parts[0]
@@ -238,8 +239,7 @@ def axis_text(axis: Axis) -> str:
 
 def inner(of: Shape) -> str:
     """The expression of a shape without brackets around it."""
-    text = of._text
-    return text[1:-1] if text.startswith("(") else text
+    return of._text[1:-1] if of._sum else of._text
 
 
 def _other(given: object) -> Shape | None:

@@ -92,7 +92,7 @@ impl Distance for Blend {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        let level = level::at(self, p);
+        let level = level::at(self, p, None);
         if level.lower < 0.0 {
             return level;
         }
@@ -138,7 +138,7 @@ impl Source for Blend {
             let apart = self.middle(cell).is_some_and(|[a, b]| (a - b).abs() - 2.0 * self.reach(cell) >= self.radius);
             apart && self.shapes.iter().all(|shape| shape.slack(cell) == Interval::exact(0.0))
         };
-        let level = level::slack(self, cell, unit);
+        let level = level::slack(self, cell, None, unit);
         Interval { lower: level.lower, upper: level.upper.min(upper).max(level.lower) }
     }
 

@@ -39,14 +39,16 @@ pub fn intersection(shapes: &[Arc<dyn Source>]) -> Result<Complement> {
     }
     let outsides = shapes.iter().map(|shape| Arc::new(Complement::new(Arc::clone(shape))) as Arc<dyn Source>).collect();
     let bounded = shapes.iter().any(|shape| shape.extent().is_some());
-    Ok(Complement::within(Arc::new(Union::new(outsides)?), bounded.then_some(common)))
+    let extent = bounded.then_some(common);
+    Ok(Complement::within(Arc::new(Union::new(outsides)?.look_within(extent)), extent))
 }
 
 /// What is in a shape and in none of the others.
 pub fn difference(shape: &Arc<dyn Source>, others: &[Arc<dyn Source>]) -> Result<Complement> {
     let mut parts: Vec<Arc<dyn Source>> = vec![Arc::new(Complement::new(Arc::clone(shape)))];
     parts.extend(others.iter().map(Arc::clone));
-    Ok(Complement::within(Arc::new(Union::new(parts)?), shape.extent()))
+    let extent = shape.extent();
+    Ok(Complement::within(Arc::new(Union::new(parts)?.look_within(extent)), extent))
 }
 
 /// Mirrored at 0.

@@ -10,15 +10,17 @@ use crate::geom::{Aabb, DVec3, Interval};
 const AXES: [DVec3; 6] = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
 
 /// Steps of a ray: enough to cross what is worth crossing.
-const STEPS: usize = 48;
+const STEPS: u32 = 64;
 
-/// Rounds of turning a ray toward the nearest point of the plane that it met.
-const TURNS: usize = 6;
+/// Rays are turned no finer than this.
+const LEAST_TURN: f64 = 0.02;
 
 /// The distance at `p`: exact where the gradient leads straight to the surface and out on its other side, else from the
 /// value to the nearest point that some rays find on the other side.
-pub fn at(shape: &dyn Source, p: DVec3) -> Interval {
-    let Some(asked) = Asked::new(shape, p) else { return Interval::ALL };
+///
+/// `beside` is a point of one side, if one is known: rays are sent there, too.
+pub fn at(shape: &dyn Source, p: DVec3, beside: Option<DVec3>) -> Interval {
+    let Some(asked) = Asked::new(shape, p, beside) else { return Interval::ALL };
     asked.interval()
 }
 
@@ -26,9 +28,9 @@ pub fn at(shape: &dyn Source, p: DVec3) -> Interval {
 ///
 /// Where the gradient has length 1, as `unit` says of boxes, the distance is the value wherever the slope does not jump
 /// between a cell and the surface.
-pub fn slack(shape: &dyn Source, cell: &Aabb, unit: impl Fn(&Aabb) -> bool) -> Interval {
+pub fn slack(shape: &dyn Source, cell: &Aabb, beside: Option<DVec3>, unit: impl Fn(&Aabb) -> bool) -> Interval {
     let (center, radius) = (cell.center(), cell.radius() * (1.0 + 1e-9));
-    let Some(asked) = Asked::new(shape, center) else { return Interval::ALL };
+    let Some(asked) = Asked::new(shape, center, beside) else { return Interval::ALL };
     if straight(&asked, cell, unit) {
         return Interval::exact(0.0);
     }
@@ -65,6 +67,32 @@ fn straight(asked: &Asked<'_>, cell: &Aabb, unit: impl Fn(&Aabb) -> bool) -> boo
     false
 }
 
+/// A point of a box that is outside of a shape, if walking up the values from a few places finds one.
+pub fn outside(shape: &dyn Source, extent: &Aabb) -> Option<DVec3> {
+    (0..LOOKS).find_map(|i| {
+        // Evenly spread, whatever their number.
+        let share = SPREAD * f64::from(i) + 0.5;
+        let mut p = extent.min + extent.size() * (share - share.floor());
+        for _ in 0..WALK {
+            let value = value(shape, p)?;
+            if value > shape.noise() {
+                return Some(p);
+            }
+            let mut slope = [DVec3::ZERO];
+            shape.gradients(&[p], &mut slope).ok()?;
+            p += slope[0] * (1.01 * value.abs());
+        }
+        None
+    })
+}
+
+/// Powers of the inverse of the number whose fourth power is one more than it: no places crowd.
+const SPREAD: DVec3 = DVec3::new(0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_1);
+
+/// Places from where a point outside is looked for, and steps of each walk.
+const LOOKS: u32 = 64;
+const WALK: usize = 6;
+
 /// The box of a cell and a ball.
 fn around(cell: &Aabb, center: DVec3, radius: f64) -> Aabb {
     cell.union(Aabb::new(center, center).grow(radius))
@@ -78,15 +106,16 @@ struct Asked<'a> {
     gradient: DVec3,
     /// What rounding and solving may do to values here.
     rounding: f64,
+    beside: Option<DVec3>,
 }
 
 impl<'a> Asked<'a> {
     /// `None` where the shape cannot be asked.
-    fn new(shape: &'a dyn Source, p: DVec3) -> Option<Self> {
+    fn new(shape: &'a dyn Source, p: DVec3, beside: Option<DVec3>) -> Option<Self> {
         let (value, mut gradient) = (value(shape, p)?, [DVec3::ZERO]);
         shape.gradients(&[p], &mut gradient).ok()?;
         let rounding = shape.noise() + 64.0 * f64::EPSILON * (p.abs().max_element() + value.abs());
-        Some(Self { shape, p, value, gradient: gradient[0].normalize_or(DVec3::X), rounding })
+        Some(Self { shape, p, value, gradient: gradient[0].normalize_or(DVec3::X), rounding, beside })
     }
 
     /// Away from the side that the point is on.
@@ -125,35 +154,35 @@ impl<'a> Asked<'a> {
 
     /// The way to the nearest point that rays find on the other side; infinite where they find none.
     fn farthest(&self) -> f64 {
-        let (mut best, mut end) = (f64::INFINITY, None);
+        let mut best = (f64::INFINITY, DVec3::ZERO);
+        if let Some(there) = self.beside.filter(|&there| self.beyond(there).is_some_and(|beyond| beyond > self.rounding)) {
+            let (direction, way) = (there - self.p).normalize_and_length();
+            best = (self.first(direction, self.value.abs(), way), direction);
+        }
         for direction in std::iter::once(self.across()).chain(AXES) {
-            self.shorten(direction, &mut best, &mut end);
+            self.shorten(direction, &mut best);
         }
-        for _ in 0..TURNS {
-            let Some(q) = end else { break };
-            let mut normal = [DVec3::ZERO];
-            if self.shape.gradients(&[q], &mut normal).is_err() {
-                break;
+        // Turned aside, less and less: ends of short ways lie on edges, too, where no slope leads along.
+        let mut turn = 0.5;
+        while best.0.is_finite() && turn > LEAST_TURN {
+            let (before, ahead) = (best.0, best.1);
+            let (u, w) = ahead.any_orthonormal_pair();
+            for aside in [u, -u, w, -w] {
+                self.shorten((ahead + aside * turn).normalize(), &mut best);
             }
-            let normal = normal[0].normalize_or_zero();
-            let toward = normal * (q - self.p).dot(normal);
-            let before = best;
-            for share in [1.0, 0.5, 0.2] {
-                self.shorten((q - self.p).lerp(toward, share).normalize_or_zero(), &mut best, &mut end);
-            }
-            if best > before * (1.0 - 1e-6) {
-                break;
+            if best.0 > before * (1.0 - 0.1 * turn * turn) {
+                turn *= 0.5;
             }
         }
-        best
+        best.0
     }
 
-    /// Keeps the end of a ray if it is nearer than the best so far.
-    fn shorten(&self, direction: DVec3, best: &mut f64, end: &mut Option<DVec3>) {
+    /// Keeps a ray if it ends nearer than the best so far.
+    fn shorten(&self, direction: DVec3, best: &mut (f64, DVec3)) {
         if direction != DVec3::ZERO
-            && let Some(way) = self.ray(direction, *best)
+            && let Some(way) = self.ray(direction, best.0)
         {
-            (*best, *end) = (way, Some(self.p + direction * way));
+            *best = (way, direction);
         }
     }
 
@@ -170,7 +199,8 @@ impl<'a> Asked<'a> {
                 return Some(self.first(direction, here, ahead));
             }
             here = ahead;
-            ahead += (-beyond).max(least * f64::from(1 + step as u32 / 8));
+            // Ever longer: along a wall that parts share values stay next to nothing.
+            ahead += (-beyond).max(least * f64::from(step / 2).exp2());
         }
         None
     }

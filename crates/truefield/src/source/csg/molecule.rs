@@ -56,12 +56,12 @@ impl Molecule {
         Ok(Self { centers, radii, sharpness, least, greatest, spread, tree, extent })
     }
 
-    /// M and its gradient.
-    fn level(&self, p: DVec3) -> (f64, DVec3) {
+    /// 1 + (M + log n) / s, the square of the root in the value, and the gradient of M.
+    fn square(&self, p: DVec3) -> (f64, DVec3) {
         let (mut lowest, mut found) = (f64::INFINITY, Vec::new());
-        let reach = |lowest: f64| self.greatest * (1.0 + (lowest + NOTHING) / self.sharpness).max(0.0).sqrt();
+        let reach = |lowest: f64| self.greatest * ((lowest + NOTHING) / self.sharpness).sqrt();
         self.tree.visit(&Aabb::new(p, p), f64::INFINITY, |i, limit| {
-            let exponent = self.sharpness * ((p - self.centers[i]).length_squared() / (self.radii[i] * self.radii[i]) - 1.0);
+            let exponent = self.sharpness * (p - self.centers[i]).length_squared() / (self.radii[i] * self.radii[i]);
             lowest = lowest.min(exponent);
             *limit = reach(lowest);
             found.push((i, exponent));
@@ -76,16 +76,18 @@ impl Molecule {
             sum += part;
             slope += (p - self.centers[i]) * (part * 2.0 * self.sharpness / (self.radii[i] * self.radii[i]));
         }
-        (lowest - sum.ln(), slope / sum)
+        // Neither part is negative: nothing cancels where the square is small.
+        ((lowest + (self.spread - sum.ln()).max(0.0)) / self.sharpness, slope / sum)
     }
 
-    fn scaled(&self, level: f64) -> f64 {
-        (1.0 + (level + self.spread) / self.sharpness).max(0.0).sqrt()
+    /// The square on the surface, where M is 0.
+    fn threshold(&self) -> f64 {
+        1.0 + self.spread / self.sharpness
     }
 
-    fn value(&self, level: f64) -> f64 {
+    fn value(&self, square: f64) -> f64 {
         // The difference of the roots, without cancelling.
-        self.least * (level / self.sharpness) / (self.scaled(level) + self.scaled(0.0))
+        self.least * (square - self.threshold()) / (square.sqrt() + self.threshold().sqrt())
     }
 }
 
@@ -95,7 +97,7 @@ impl Distance for Molecule {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        let level = level::at(self, p);
+        let level = level::at(self, p, None);
         if level.lower < 0.0 {
             return level;
         }
@@ -108,27 +110,27 @@ impl Distance for Molecule {
 impl Source for Molecule {
     fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
         for (out, &p) in out.iter_mut().zip(points) {
-            *out = self.value(self.level(p).0);
+            *out = self.value(self.square(p).0);
         }
         Ok(())
     }
 
     fn gradients(&self, points: &[DVec3], out: &mut [DVec3]) -> Result<()> {
         for (out, &p) in out.iter_mut().zip(points) {
-            let (level, slope) = self.level(p);
-            *out = slope * (0.5 * self.least / self.sharpness / self.scaled(level).max(f64::MIN_POSITIVE));
+            let (square, slope) = self.square(p);
+            *out = slope * (0.5 * self.least / self.sharpness / square.sqrt().max(f64::MIN_POSITIVE));
         }
         Ok(())
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {
-        level::slack(self, cell, |_| false)
+        level::slack(self, cell, None, |_| false)
     }
 
     /// From the second derivatives of M: of the Gaussians upward, less the spread of their slopes.
     fn bend(&self, cell: &Aabb) -> Interval {
         let Some(value) = level::value(self, cell.center()) else { return Interval::ALL };
-        let (middle, radius) = (self.scaled(0.0) + value / self.least, cell.radius() * (1.0 + 1e-9) / self.least);
+        let (middle, radius) = (self.threshold().sqrt() + value / self.least, cell.radius() * (1.0 + 1e-9) / self.least);
         let (low, high) = (middle - radius, middle + radius);
         if !(low > 0.0) {
             return Interval::ALL;

@@ -19,6 +19,8 @@ use super::measure::length;
 pub struct Offset {
     shape: Arc<dyn Source>,
     distance: f64,
+    /// A point in it, where it was shrunk.
+    inside: Option<DVec3>,
 }
 
 impl Offset {
@@ -33,7 +35,12 @@ impl Offset {
         if deepest.is_some_and(|deepest| distance <= -deepest) {
             return Err(Error::invalid(format!("the offset is {distance}, which leaves nothing of the shape; no point of it is so deep")));
         }
-        Ok(Self { shape, distance })
+        let grown = Self { shape, distance, inside: None };
+        let inside = grown.extent().filter(|_| distance < 0.0).and_then(|extent| {
+            let around: Arc<dyn Source> = Arc::new(grown.clone());
+            level::outside(&Complement::new(around), &extent)
+        });
+        Ok(Self { inside, ..grown })
     }
 
     /// Whether the shape is exact all the way from a cell to the surface of the offset, and has no ridges there, seen from
@@ -58,7 +65,7 @@ impl Distance for Offset {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        level::at(self, p)
+        level::at(self, p, self.inside)
     }
 }
 
@@ -85,7 +92,7 @@ impl Source for Offset {
         if self.way_is_smooth(cell, value) {
             return Interval::exact(0.0);
         }
-        level::slack(self, cell, |cell| self.shape.slack(cell) == Interval::exact(0.0))
+        level::slack(self, cell, self.inside, |cell| self.shape.slack(cell) == Interval::exact(0.0))
     }
 
     fn bend(&self, cell: &Aabb) -> Interval {

@@ -46,7 +46,13 @@ impl Sponge {
                 across[along] = 0.0;
                 let way = across.length();
                 if way < best.0 {
-                    best = (way, -across.normalize_or_zero() * DVec3::ONE.copysign(away));
+                    // On a wall, out of it.
+                    let toward = across.try_normalize().unwrap_or_else(|| {
+                        let mut walls = away.abs();
+                        walls[along] = 0.0;
+                        DVec3::AXES[walls.max_position()]
+                    });
+                    best = (way, -toward * DVec3::ONE.copysign(away));
                 }
             }
             period /= 3.0;
@@ -123,12 +129,18 @@ impl Sponge {
         let foot = center - out * value;
         let round = 1e-12 * self.half;
         let (above, below) = ((value + half[axis]).max(0.0), (half[axis] - value).max(0.0));
-        let wide = (half.length_squared() - half[axis] * half[axis]).max(0.0).sqrt() + round;
+        // From the foot, where the cell reaches across the plane, and else from the middle of the cell.
+        let behind = foot - out * round;
+        let (from, clear) = if above > 0.0 {
+            (behind, (half.length_squared() - half[axis] * half[axis]).max(0.0).sqrt() + 2.0 * below)
+        } else {
+            (center, half.length() + below)
+        };
         let (mut free, mut other): (f64, f64) = (-1.0, f64::INFINITY);
         for face in 0..3 {
             for side in [-1.0, 1.0] {
-                let way = self.half - side * foot[face];
-                if face == axis && side == sign && way.abs() <= round {
+                let way = self.half - side * from[face];
+                if face == axis && side == sign && (self.half - side * foot[face]).abs() <= round {
                     free = f64::INFINITY;
                 } else {
                     other = other.min(way);
@@ -138,7 +150,7 @@ impl Sponge {
         let mut period = 2.0 * self.half;
         for _ in 0..self.level {
             let width = period / 3.0;
-            let away = self.away(foot - out * round, period);
+            let (away, aside) = (self.away(behind, period), self.away(from, period));
             for along in 0..3 {
                 // The axis that is neither the plane's nor the bar's.
                 let across = (0..3).find(|&other| other != axis && other != along).unwrap_or(axis);
@@ -147,16 +159,16 @@ impl Sponge {
                 if wall && level {
                     let side = 0.5 * width - away[across].abs() - half[across];
                     free = free.max(side.min(width - above));
-                    other = other.min(2.0 * width);
+                    other = other.min(2.0 * width - value.abs());
                 } else {
-                    let mut beyond = (away.abs() - 0.5 * width).max(DVec3::ZERO);
+                    let mut beyond = (aside.abs() - 0.5 * width).max(DVec3::ZERO);
                     beyond[along] = 0.0;
                     other = other.min(beyond.length());
                 }
             }
             period = width;
         }
-        free >= above && other >= wide + 2.0 * below + 8.0 * round
+        free >= above && other >= clear + 8.0 * round
     }
 }
 

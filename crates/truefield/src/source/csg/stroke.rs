@@ -49,15 +49,16 @@ struct Stroke {
     way: f64,
     turning: Turning,
     extent: Aabb,
-    /// The values are solved to this.
+    /// Values are solved to `fine`; where turning leaves them flat along the way, `open` may be left.
     fine: f64,
+    open: f64,
 }
 
 /// So many sizes away a tool is asked whether it is convex.
 const AWAY: f64 = 1e3;
 
 /// Halvings and cuts: more than any minimum takes; what is left open is below rounding.
-const CUTS: usize = 400;
+const CUTS: usize = 1000;
 
 /// A part of the way with the values and slopes at its ends.
 #[derive(Clone, Copy, Debug)]
@@ -91,8 +92,8 @@ impl Stroke {
         let reach = swept.min.abs().max(swept.max.abs()).max_element();
         // Where turning leaves the values flat, so many cuts leave this open.
         let open = turning.angle * (turning.angle * (size + way) + 2.0 * way) / (CUTS * CUTS) as f64;
-        let fine = 1e-14 * (size + way) + 4.0 * f64::EPSILON * reach + open;
-        Ok(Self { tool: Arc::clone(tool), from, to, way, turning, extent: swept, fine })
+        let fine = 1e-14 * (size + way) + 4.0 * f64::EPSILON * reach;
+        Ok(Self { tool: Arc::clone(tool), from, to, way, turning, extent: swept, fine, open })
     }
 
     fn pose(&self, share: f64) -> Placement {
@@ -171,7 +172,7 @@ impl Stroke {
 
     /// The shares of the way that can be nearest to points of a ball: where the value is not above the least by twice its radius.
     fn shares(&self, p: DVec3, radius: f64, best: Probe) -> Result<[f64; 2]> {
-        let (limit, sag) = (best.value + 2.0 * radius + self.fine, self.sag(p));
+        let (limit, sag) = (best.value + 2.0 * radius + self.fine + self.open, self.sag(p));
         let (mut first, mut last) = (best.share, best.share);
         let mut pieces = vec![(self.piece([self.probe(p, 0.0)?, self.probe(p, 1.0)?], sag), 0)];
         while let Some((piece, depth)) = pieces.pop() {
@@ -217,7 +218,7 @@ impl Distance for Stroke {
     fn at(&self, p: DVec3) -> Interval {
         match self.least(p) {
             Ok(best) if best.value >= 0.0 => Interval::exact(best.value),
-            Ok(_) => level::at(self, p),
+            Ok(_) => level::at(self, p, None),
             Err(_) => Interval::ALL,
         }
     }
@@ -243,7 +244,7 @@ impl Source for Stroke {
         if value > cell.radius() * (1.0 + 1e-9) + self.noise() {
             return Interval::exact(0.0);
         }
-        let level = level::slack(self, cell, |_| true);
+        let level = level::slack(self, cell, None, |_| true);
         Interval { lower: level.lower, upper: 0.0 }
     }
 
@@ -252,6 +253,6 @@ impl Source for Stroke {
     }
 
     fn noise(&self) -> f64 {
-        2.0 * self.fine + self.tool.noise()
+        2.0 * self.fine + self.open + self.tool.noise()
     }
 }

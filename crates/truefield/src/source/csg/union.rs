@@ -26,6 +26,8 @@ pub struct Union {
     /// Those whose values may have the wrong sign.
     doubtful: Vec<u32>,
     noise: f64,
+    /// A point that is in no part, where one was looked for.
+    beside: Option<DVec3>,
 }
 
 /// A part that may have the least value somewhere in a cell, and its value at the middle.
@@ -57,7 +59,13 @@ impl Union {
         let boxes = Boxes::new(bounded.iter().filter_map(|&i| parts[i as usize].extent()).collect());
         let doubtful = (0..parts.len() as u32).filter(|&i| !parts[i as usize].sided()).collect();
         let noise = parts.iter().map(|part| part.noise()).fold(0.0, f64::max);
-        Ok(Self { parts, extent, boxes, bounded, loose, doubtful, noise })
+        Ok(Self { parts, extent, boxes, bounded, loose, doubtful, noise, beside: None })
+    }
+
+    /// Looks for a point of a box that is in no part: what surrounds everything but a bounded solid has to know where that is.
+    pub(super) fn look_within(mut self, extent: Option<Aabb>) -> Self {
+        self.beside = extent.and_then(|extent| level::outside(&self, &extent));
+        self
     }
 
     /// The parts that may have the least value somewhere in the cell; `None` where they are more than `most`.
@@ -196,7 +204,7 @@ impl Distance for Union {
         if value >= 0.0 || own.lower == own.upper && self.alone(part, p, -own.lower * (1.0 + 1e-9) + self.noise) {
             return own;
         }
-        let level = level::at(self, p);
+        let level = level::at(self, p, self.beside);
         Interval { lower: level.lower, upper: level.upper.min(own.upper).max(level.lower) }
     }
 
@@ -250,7 +258,7 @@ impl Source for Union {
         let unit = |cell: &Aabb| {
             self.candidates(cell, MANY).is_ok_and(|found| found.is_some_and(|found| found.iter().all(|found| exact(found.part, cell))))
         };
-        let level = level::slack(self, cell, unit);
+        let level = level::slack(self, cell, self.beside, unit);
         Interval { lower: level.lower, upper: level.upper.min(upper).max(level.lower) }
     }
 
