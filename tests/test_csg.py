@@ -61,7 +61,7 @@ def test_primitives_measure_what_they_say() -> None:
         (csg.cone(1, 2, top=1), (3, 0, 0), 2.0),
         (csg.cone(1, 2, axis=(0, 0, -1)), (0, 0, -2), 1.0),
         (csg.capsule((0, 0, 0), (1, 0, 0), 0.5), (2, 0, 0), 0.5),
-        (csg.torus(2, 0.5), (0, 0, 0), 1.5),
+        (csg.torus(2, 0.5), (0.5, 0, 0), 1.0),
         (csg.torus(2, 0.5, axis="y", center=(1, 0, 0)), (1, 0, 2), -0.5),
         (csg.half_space((0, 0, 1), (0, 0, 2)), (5, 5, 3), 2.0),
         (csg.ellipsoid((3, 2, 1)), (0, 0, 4), 3.0),

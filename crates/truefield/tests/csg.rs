@@ -316,7 +316,7 @@ fn combined() -> Vec<(&'static str, Shape)> {
         (0..60).map(|_| arc(Sphere::new(random.within(&Aabb::new(DVec3::splat(-2.0), DVec3::splat(2.0))), 0.6))).collect();
     let boxes: Vec<Shape> = (0..12).map(|i| arc(Cuboid::new(v(f64::from(i % 4), f64::from(i / 4), 0.0), v(1.0, 1.0, 0.5)))).collect();
     let path: Vec<DVec3> = (0..30).map(|i| f64::from(i) * 0.3).map(|t| v(t.cos() * 2.0, t.sin() * 2.0, 0.15 * t)).collect();
-    let atoms: Vec<DVec3> = (0..20).map(|i| f64::from(i)).map(|i| v((0.7 * i).cos() * 2.0, (0.7 * i).sin() * 2.0, 0.2 * i)).collect();
+    let atoms: Vec<DVec3> = (0..20).map(f64::from).map(|i| v((0.7 * i).cos() * 2.0, (0.7 * i).sin() * 2.0, 0.2 * i)).collect();
     let radii = (0..20).map(|i| 0.5 + 0.02 * f64::from(i)).collect();
     let chisel = turned(arc(Cuboid::new(DVec3::ZERO, v(0.5, 0.2, 0.8))));
     let stops: Vec<Placement> = path[..6].iter().map(|&p| Placement::translate(p).expect("a shift")).collect();

@@ -151,6 +151,10 @@ impl Source for Blend {
         Interval { lower: both.lower - self.sharpest(), upper: both.upper }
     }
 
+    fn is_flat(&self) -> bool {
+        self.shapes.iter().all(|shape| shape.is_flat())
+    }
+
     fn sided(&self) -> bool {
         self.shapes.iter().all(|shape| shape.sided())
     }

@@ -102,6 +102,10 @@ impl Source for Complement {
         negated(self.shape.bend(cell))
     }
 
+    fn is_flat(&self) -> bool {
+        self.shape.is_flat()
+    }
+
     fn sided(&self) -> bool {
         self.shape.sided()
     }

@@ -92,6 +92,10 @@ impl Source for Kept {
         Interval { lower: bend.lower.min(0.0), upper: f64::INFINITY }
     }
 
+    fn is_flat(&self) -> bool {
+        self.shape.is_flat()
+    }
+
     fn sided(&self) -> bool {
         self.shape.sided()
     }

@@ -99,6 +99,10 @@ impl Source for Offset {
         self.shape.bend(cell)
     }
 
+    fn is_flat(&self) -> bool {
+        self.shape.is_flat()
+    }
+
     fn sided(&self) -> bool {
         self.shape.sided()
     }

@@ -271,6 +271,10 @@ impl Source for Union {
         if found.len() > 1 { Interval { lower: f64::NEG_INFINITY, ..hull } } else { hull }
     }
 
+    fn is_flat(&self) -> bool {
+        self.parts.iter().all(|part| part.is_flat())
+    }
+
     fn sided(&self) -> bool {
         self.doubtful.is_empty()
     }
