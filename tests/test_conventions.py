@@ -132,3 +132,16 @@ def test_images_are_foreground_where_they_are_not_zero() -> None:
         outside, inside = -steps[:3] + nearest, -(steps[3:] - 1.0 + nearest)
         np.testing.assert_array_equal(found[:, 2], 0.5 * np.concatenate([outside, inside]))
     assert np.all(np.isinf(tf.distance_transform(np.ones((3, 3)))))
+
+
+def test_shapes_are_centred_and_their_values_are_bounds() -> None:
+    csg = tf.csg
+    for shape in (csg.box((2, 4, 6)), csg.cylinder(1, 6), csg.cone(1, 6, top=1)):
+        assert shape.distance([[0, 0, 4]]) == pytest.approx([1.0])
+    assert csg.half_space((0, 0, 1), (0, 0, 1)).distance([[0, 0, 0]]) == pytest.approx([-1.0])
+    # Two halves of one block: the value ends at the face they share, the bounds go on.
+    halves = csg.box((2, 2, 2), center=(-1, 0, 0)) | csg.box((2, 2, 2), center=(1, 0, 0))
+    lower, upper = halves.bounds([[0.25, 0.0, 0.0]])
+    assert halves.distance([[0.25, 0.0, 0.0]]) == pytest.approx([-0.25])
+    assert lower[0] <= -1.0
+    assert upper == pytest.approx([-0.25])

@@ -201,7 +201,11 @@ impl Distance for Union {
             }
             return least;
         }
-        if value >= 0.0 || own.lower == own.upper && self.alone(part, p, -own.lower * (1.0 + 1e-9) + self.noise) {
+        if value >= 0.0 {
+            // Another part may be nearer than this one is, but not nearer than the least value.
+            return Interval { lower: own.lower.min(value), ..own };
+        }
+        if own.lower == own.upper && self.alone(part, p, -own.lower * (1.0 + 1e-9) + self.noise) {
             return own;
         }
         let level = level::at(self, p, self.beside);
@@ -210,7 +214,13 @@ impl Distance for Union {
 
     fn over(&self, cell: &Aabb) -> Interval {
         let Ok(Some(found)) = self.candidates(cell, MANY) else { return self.at(cell.center()).widen(cell.radius() * (1.0 + 1e-15)) };
-        let ranges = found.iter().map(|candidate| self.parts[candidate.part].over(cell));
+        let radius = cell.radius() * (1.0 + 1e-12) + self.noise;
+        let ranges = found.iter().map(|candidate| {
+            let (part, range) = (&self.parts[candidate.part], self.parts[candidate.part].over(cell));
+            // Where values are not distances, parts that are farther by value may be nearer.
+            let exact = part.slack(cell).upper <= 0.0;
+            Interval { lower: if exact { range.lower } else { range.lower.min(candidate.value - radius) }, ..range }
+        });
         let least = ranges.reduce(|a, b| Interval { lower: a.lower.min(b.lower), upper: a.upper.min(b.upper) });
         match least {
             Some(least) if least.lower >= 0.0 && self.doubtful.is_empty() => least,
