@@ -65,7 +65,7 @@ def test_primitives_measure_what_they_say() -> None:
         (csg.half_space((0, 0, 1), (0, 0, 2)), (5, 5, 3), 2.0),
         (csg.ellipsoid((3, 2, 1)), (0, 0, 4), 3.0),
         (csg.menger_sponge(2), (0.47, 0.47, 0.7), 0.2),
-        (csg.menger_sponge(3, size=3), (0, 0, 3), 1.5),
+        (csg.menger_sponge(3, size=3), (1.4, 1.4, 3), 1.5),
         (csg.molecule([(0, 0, 0)], 1.5), (4, 0, 0), 2.5),
         (csg.sweep(csg.sphere(0.5), [(0, 0, 0), (3, 0, 0)]), (1, 2, 0), 1.5),
         (csg.sphere(1).scale(2).translate((1, 0, 0)), (4, 0, 0), 1.0),
