@@ -32,6 +32,7 @@ __all__ = [
     "difference_of",
     "distance_transform",
     "ellipsoid",
+    "field_outline",
     "frustum",
     "function_shape",
     "half_space",
@@ -47,7 +48,6 @@ __all__ = [
     "site_indices",
     "skewed_bounds",
     "skewed_transform",
-    "solid_extent",
     "sphere",
     "sweep",
     "thickness",
@@ -516,9 +516,9 @@ def collide(
 ) -> tuple[
     Literal["separated", "penetrating", "touching or undecided"], float, float, list[float], list[float], int
 ]: ...
-def solid_extent(
+def field_outline(
     field: AdaptiveField, distance: float, threads: int | None = None, progress: _Progress = None
-) -> tuple[list[float], list[float]]: ...
+) -> _Floats: ...
 def render_field(
     field: AdaptiveField,
     camera: Camera,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw
 
-from truefield._truefield import Camera, Scene, render_field, solid_extent
+from truefield._truefield import Camera, Scene, field_outline, render_field
 from truefield.adaptive import AdaptiveField
 from truefield.cloud import PointCloud
 from truefield.colours import Colour, colours_of, distinct, even_map
@@ -150,9 +150,10 @@ def field_picture(
         TruefieldError: an input cannot be drawn; the sentence says why.
     """
     _check_size(size)
-    low, high = (np.array(corner) for corner in solid_extent(field._native, distance, threads, progress))
-    corners = np.array([np.where([i & 1, i & 2, i & 4], high, low) for i in range(8)])
-    camera = _view(corners, view, 0.06)
+    outline = field_outline(field._native, distance, threads, progress)
+    if len(outline) == 0:
+        raise TruefieldError(f"no surface is at distance {distance:g}; there is nothing to draw")
+    camera = _view(outline, view, 0.06)
     pixels, _ = render_field(
         field._native,
         camera,

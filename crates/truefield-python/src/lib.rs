@@ -60,7 +60,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(products::occluded_rays, module)?)?;
     module.add_function(wrap_pyfunction!(products::adaptive_surface, module)?)?;
     module.add_function(wrap_pyfunction!(products::collide_solids, module)?)?;
-    module.add_function(wrap_pyfunction!(products::solid_extent, module)?)?;
+    module.add_function(wrap_pyfunction!(products::field_outline, module)?)?;
     module.add_function(wrap_pyfunction!(products::draw_field, module)?)?;
     module.add_function(wrap_pyfunction!(csg::capsule, module)?)?;
     module.add_function(wrap_pyfunction!(csg::half_space, module)?)?;

@@ -122,18 +122,17 @@ pub fn collide_solids(
     Ok((state, found.separation.lower, found.separation.upper, found.first.to_array(), found.second.to_array(), found.boxes))
 }
 
-/// `(lowest corner, highest corner)` of the cells that the surface at a distance meets.
+/// Outermost corners of the cells that the surface at a distance meets.
 #[pyfunction]
-#[pyo3(name = "solid_extent", signature = (field, distance, threads=None, progress=None))]
-pub fn solid_extent(
-    py: Python<'_>,
+#[pyo3(name = "field_outline", signature = (field, distance, threads=None, progress=None))]
+pub fn field_outline<'py>(
+    py: Python<'py>,
     field: &PyAdaptiveField,
     distance: f64,
     threads: Option<usize>,
-    progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<([f64; 3], [f64; 3])> {
-    let Aabb { min, max } = job(py, threads, progress, |run| Ok(field.caster(distance, run)?.solid()))?;
-    Ok((min.to_array(), max.to_array()))
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Rows<'py>> {
+    rows(py, job(py, threads, progress, |run| field.caster(distance, run)?.outline(run))?.into_iter())
 }
 
 type Drawn<'py> = (Bound<'py, PyArray3<u8>>, Bound<'py, PyArray2<f32>>);

@@ -26,8 +26,22 @@ pub(super) fn bernstein([a, b, c, d]: [f64; 4]) -> [f64; 4] {
 ///
 /// The cubic lies in the hull of its coefficients, so parts of one sign are passed over, and no two crossings are farther
 /// apart than what they are told apart by.
+#[inline]
 pub(super) fn first_root(cubic: [f64; 4]) -> Option<f64> {
-    let changes = |c: &[f64; 4]| (0..3).filter(|&i| (c[i] < 0.0) != (c[i + 1] < 0.0)).count();
+    match changes(&cubic) {
+        0 => None,
+        1 => Some(only_root(&cubic)),
+        _ => search(cubic),
+    }
+}
+
+fn changes(c: &[f64; 4]) -> usize {
+    (0..3).filter(|&i| (c[i] < 0.0) != (c[i + 1] < 0.0)).count()
+}
+
+/// The same by halving.
+#[cold]
+fn search(cubic: [f64; 4]) -> Option<f64> {
     let mut stack = [([0.0; 4], 0.0, 0.0); 48];
     let mut count = 1;
     stack[0] = (cubic, 0.0, 1.0);

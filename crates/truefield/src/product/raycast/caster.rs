@@ -1,5 +1,6 @@
 //! A tree made ready for rays: cells that the surface does not meet are one with their neighbours of the same side.
 
+use super::walk::FULL;
 use crate::error::{Error, Result};
 use crate::field::adaptive::{AdaptiveField, Cell, Division, Leaf};
 use crate::geom::{Aabb, DVec3};
@@ -54,6 +55,8 @@ pub struct Caster {
     pub(super) field: AdaptiveField,
     pub(super) distance: f64,
     pub(super) extent: Aabb,
+    /// Finest cells a unit of length, along each axis.
+    pub(super) scale: DVec3,
     pub(super) columns: bool,
     pub(super) root: u32,
     /// Children as words; of columns the upper four are not used.
@@ -62,8 +65,6 @@ pub struct Caster {
     pub(super) corners: Vec<[f32; 8]>,
     /// Middles of leaves that answer in another way.
     pub(super) others: Vec<DVec3>,
-    /// The box of all cells that the surface meets.
-    solid: Aabb,
 }
 
 /// Part of a caster while it is made.
@@ -72,7 +73,6 @@ struct Part {
     nodes: Vec<[u32; 8]>,
     corners: Vec<[f32; 8]>,
     others: Vec<DVec3>,
-    solid: Option<Aabb>,
 }
 
 impl Caster {
@@ -97,24 +97,53 @@ impl Caster {
         let mut whole = Part::default();
         let roots: Vec<Child> = parts.into_iter().map(|(part, root)| whole.append(part, root)).collect();
         let root = whole.join(field.root(), &mut roots.into_iter()).word();
-        let Part { nodes, corners, others, solid } = whole;
+        let Part { nodes, corners, others } = whole;
         let columns = field.division() == Division::Quadtree;
         Ok(Self {
             field: field.clone(),
             distance,
             extent: field.extent_box(),
+            scale: f64::from(FULL) / field.extent_box().size(),
             columns,
             root,
             nodes,
             corners,
             others,
-            solid: solid.unwrap_or(field.extent_box()),
         })
     }
 
-    /// The box of all cells that the surface meets; the domain where it meets none.
-    pub fn solid(&self) -> Aabb {
-        self.solid
+    /// Corners of cells that the surface meets: the outermost in each of many directions. All of it lies in their hull, but for
+    /// a part of a cell; none where it meets no cell.
+    pub fn outline(&self, run: &Run<'_>) -> Result<Vec<DVec3>> {
+        let steps = || (-2..=2).map(f64::from);
+        let directions = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z))));
+        let directions: Vec<DVec3> = directions.filter(|&direction| direction != DVec3::ZERO).collect();
+        let mut cells = Vec::new();
+        let mut stack = vec![(self.root, [0u32; 3], FULL)];
+        while let Some((word, place, size)) = stack.pop() {
+            let sizes = if self.columns { [size, size, FULL] } else { [size; 3] };
+            match Child::of(word) {
+                Child::Branch(node) => {
+                    let half = size / 2;
+                    let octants = if self.columns { 4 } else { 8 };
+                    for octant in 0..octants {
+                        let at = std::array::from_fn(|axis| place[axis] + half * (octant as u32 >> axis & 1));
+                        stack.push((self.nodes[node as usize][octant], at, half));
+                    }
+                }
+                Child::Linear(_) | Child::Other(_) => {
+                    let at = |step: u32| DVec3::from_array(std::array::from_fn(|axis| f64::from(place[axis] + step * sizes[axis])));
+                    cells.push(Aabb::new(self.extent.min + at(0) / self.scale, self.extent.min + at(1) / self.scale));
+                }
+                Child::Empty(_) => {}
+            }
+        }
+        run.blocks("find the outline", if cells.is_empty() { 0 } else { directions.len() }, |number| {
+            let direction = directions[number];
+            let corner = |cell: &Aabb| DVec3::select(direction.cmpgt(DVec3::ZERO), cell.max, cell.min);
+            let outermost = cells.iter().map(|cell| (corner(cell).dot(direction), corner(cell)));
+            Ok(outermost.fold((f64::NEG_INFINITY, DVec3::ZERO), |best, next| if next.0 > best.0 { next } else { best }).1)
+        })
     }
 }
 
@@ -123,16 +152,13 @@ impl Part {
         let count = cell.children();
         if count == 0 {
             let extent = cell.extent();
-            let mut met = || self.solid = Some(self.solid.map_or(extent, |solid| solid.union(extent)));
             let below = cell.corners().iter().filter(|&&v| f64::from(v) < distance).count();
             return match cell.leaf() {
                 Leaf::Linear if below % 8 != 0 => {
-                    met();
                     self.corners.push(*cell.corners());
                     Child::Linear(self.corners.len() as u32 - 1)
                 }
                 Leaf::Cubic(_) | Leaf::Exact(_) if below % 8 != 0 || cell.over().contains(distance) => {
-                    met();
                     self.others.push(extent.center());
                     Child::Other(self.others.len() as u32 - 1)
                 }
@@ -167,7 +193,6 @@ impl Part {
         self.nodes.extend(other.nodes.into_iter().map(|node| node.map(|word| moved(Child::of(word)).word())));
         self.corners.extend(other.corners);
         self.others.extend(other.others);
-        self.solid = [self.solid, other.solid].into_iter().flatten().reduce(Aabb::union);
         moved(root)
     }
 

@@ -5,9 +5,11 @@
 //! cracks between cells of different size let nothing through.
 
 mod along;
+mod beam;
 mod caster;
 mod walk;
 
+use beam::RAYS;
 pub use caster::Caster;
 pub use walk::Hit;
 
@@ -35,13 +37,32 @@ impl Caster {
         check(origins, directions)?;
         let mut hits = vec![Hit::NONE; origins.len()];
         run.chunks("cast rays", &mut hits, CHUNK, |chunk, hits| {
-            for (i, hit) in hits.iter_mut().enumerate() {
-                let ray = chunk * CHUNK + i;
-                *hit = self.first(origins[ray], unit(directions[ray]), f64::INFINITY, method).unwrap_or(Hit::NONE);
+            for (i, hits) in hits.chunks_mut(RAYS).enumerate() {
+                let rays = chunk * CHUNK + i * RAYS..chunk * CHUNK + i * RAYS + hits.len();
+                self.cast_beam(&origins[rays.clone()], &directions[rays], method, hits);
             }
             Ok(())
         })?;
         Ok(hits)
+    }
+
+    /// Up to [`RAYS`] rays; quicker together where they run side by side.
+    fn cast_beam(&self, origins: &[DVec3], directions: &[DVec3], method: Method, hits: &mut [Hit]) {
+        let mut units = [DVec3::ZERO; RAYS];
+        let mut rays = [const { None }; RAYS];
+        for (i, (&origin, &direction)) in origins.iter().zip(directions).enumerate() {
+            units[i] = unit(direction);
+            rays[i] = self.prepare(origin, units[i], f64::INFINITY);
+        }
+        let free = self.free(&rays[..origins.len()]);
+        if free == f64::INFINITY {
+            return;
+        }
+        for ((hit, ray), &direction) in hits.iter_mut().zip(&rays).zip(&units) {
+            if let Some(ray) = ray {
+                *hit = self.follow(ray, free, direction, f64::INFINITY, method).unwrap_or(Hit::NONE);
+            }
+        }
     }
 
     /// Whether each ray meets the surface within `length`, model units.

@@ -11,7 +11,7 @@ use crate::field::adaptive::MAX_DEPTH;
 use crate::geom::DVec3;
 
 /// Edge of the root in units of the finest cells.
-const FULL: u32 = 1 << MAX_DEPTH;
+pub(super) const FULL: u32 = 1 << MAX_DEPTH;
 
 /// Stands for the reciprocal of zero.
 const STEEP: f64 = 1e100;
@@ -57,13 +57,24 @@ enum At {
     },
 }
 
+/// A ray that meets the domain.
+pub(super) struct Prepared {
+    pub turned: Turned,
+    /// Whether it comes from outside the domain.
+    pub outside: bool,
+    /// Where it enters the domain, or its origin.
+    start: DVec3,
+    /// How far from the origin that is.
+    begin: f64,
+}
+
 /// A ray in units of the finest cells, turned towards high coordinates.
-struct Turned {
-    origin: [f64; 3],
+pub(super) struct Turned {
+    pub origin: [f64; 3],
     direction: [f64; 3],
-    inverse: [f64; 3],
+    pub inverse: [f64; 3],
     /// Axes that were turned, a bit each.
-    mask: usize,
+    pub mask: usize,
 }
 
 impl Turned {
@@ -75,9 +86,9 @@ impl Turned {
 
     /// Coordinates from 0 to 1 in a cell, turned back.
     #[inline(always)]
-    fn local(&self, t: f64, place: [u32; 3], size: [u32; 3]) -> [f64; 3] {
+    fn local(&self, t: f64, place: [u32; 3], shrink: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|axis| {
-            let at = (self.origin[axis] + self.direction[axis] * t - f64::from(place[axis])) / f64::from(size[axis]);
+            let at = (self.origin[axis] + self.direction[axis] * t - f64::from(place[axis])) * shrink[axis];
             let at = at.clamp(0.0, 1.0);
             if self.mask >> axis & 1 == 1 { 1.0 - at } else { at }
         })
@@ -89,24 +100,26 @@ impl Caster {
     ///
     /// A ray starts on the side of its origin, outside of the domain on the outside, and ends there where it leaves.
     pub fn first(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> Option<Hit> {
-        let (found, start, begin) = self.find(origin, direction, length, method)?;
-        let t = begin + found.t;
-        if !(t <= length) {
-            return None;
-        }
-        let point = start + direction * found.t;
-        Some(Hit { distance: t, point, normal: self.normal(&found, point, direction) })
+        self.follow(&self.prepare(origin, direction, length)?, 0.0, direction, length, method)
+    }
+
+    /// The same of a ray that is prepared, and known to meet nothing before `from`.
+    pub(super) fn follow(&self, ray: &Prepared, from: f64, direction: DVec3, length: f64, method: Method) -> Option<Hit> {
+        let found = self.find(ray, from, length, method)?;
+        let point = ray.start + direction * found.t;
+        Some(Hit { distance: ray.begin + found.t, point, normal: self.normal(&found, point, direction) })
     }
 
     /// Whether the ray changes sides within `length`.
     pub fn meets(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> bool {
-        self.find(origin, direction, length, method).is_some_and(|(found, _, begin)| begin + found.t <= length)
+        self.prepare(origin, direction, length).is_some_and(|ray| self.find(&ray, 0.0, length, method).is_some())
     }
 
-    fn find(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> Option<(Found, DVec3, f64)> {
-        // Where the domain begins and ends.
+    /// The ray in the frame of the walk; `None` where it does not meet the domain.
+    #[inline]
+    pub(super) fn prepare(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<Prepared> {
         let (low, high) = (self.extent.min, self.extent.max);
-        let (mut begin, mut end, mut axis_in) = (0.0, length, 3);
+        let (mut begin, mut end, mut outside) = (0.0, length, false);
         for axis in 0..3 {
             let (near, far) = if direction[axis] < 0.0 { (high[axis], low[axis]) } else { (low[axis], high[axis]) };
             if direction[axis] == 0.0 {
@@ -117,7 +130,7 @@ impl Caster {
             }
             let enter = (near - origin[axis]) / direction[axis];
             if enter > begin {
-                (begin, axis_in) = (enter, axis);
+                (begin, outside) = (enter, true);
             }
             end = end.min((far - origin[axis]) / direction[axis]);
         }
@@ -125,11 +138,10 @@ impl Caster {
             return None;
         }
         // From there on, so that far origins lose nothing.
-        let start = if axis_in < 3 { origin + direction * begin } else { origin };
-        let size = high - low;
+        let start = if outside { origin + direction * begin } else { origin };
         let mut turned = Turned { origin: [0.0; 3], direction: [0.0; 3], inverse: [0.0; 3], mask: 0 };
         for axis in 0..3 {
-            let scale = f64::from(FULL) / size[axis];
+            let scale = self.scale[axis];
             let (mut from, mut step) = ((start[axis] - low[axis]) * scale, direction[axis] * scale);
             if step < 0.0 {
                 (from, step) = (f64::from(FULL) - from, -step);
@@ -139,28 +151,32 @@ impl Caster {
             turned.direction[axis] = step;
             turned.inverse[axis] = if step > 1.0 / STEEP { 1.0 / step } else { STEEP };
         }
-        let outside = axis_in < 3;
+        Some(Prepared { turned, outside, start, begin })
+    }
+
+    fn find(&self, ray: &Prepared, from: f64, length: f64, method: Method) -> Option<Found> {
+        let left = length - ray.begin;
         let found = match (self.columns, method) {
-            (false, Method::Linear) => self.walk::<3, false>(&turned, outside, axis_in, length - begin),
-            (false, Method::Cubic) => self.walk::<3, true>(&turned, outside, axis_in, length - begin),
-            (true, Method::Linear) => self.walk::<2, false>(&turned, outside, axis_in, length - begin),
-            (true, Method::Cubic) => self.walk::<2, true>(&turned, outside, axis_in, length - begin),
-        }?;
-        Some((found, start, begin))
+            (false, Method::Linear) => self.walk::<3, false>(ray, from, left),
+            (false, Method::Cubic) => self.walk::<3, true>(ray, from, left),
+            (true, Method::Linear) => self.walk::<2, false>(ray, from, left),
+            (true, Method::Cubic) => self.walk::<2, true>(ray, from, left),
+        };
+        found.filter(|found| ray.begin + found.t <= length)
     }
 
     /// `AXES` are divided; `CUBIC` solves for the crossing of a trilinear leaf, else the way between its ends is a line.
     #[inline(always)]
-    fn walk<const AXES: usize, const CUBIC: bool>(&self, ray: &Turned, outside: bool, axis_in: usize, length: f64) -> Option<Found> {
+    fn walk<const AXES: usize, const CUBIC: bool>(&self, prepared: &Prepared, from: f64, length: f64) -> Option<Found> {
+        let ray = &prepared.turned;
         let mask = if AXES == 3 { ray.mask } else { ray.mask & 3 };
         let mut stack = [0u32; MAX_DEPTH as usize + 1];
         let mut place = [0u32; 3];
         let mut size = FULL;
         let mut word = self.root;
-        let mut t = 0.0;
+        let mut t = from;
         // The value at the end of the last cell: infinite where only its side is known, not a number before the first.
-        let mut carried = if outside { f64::INFINITY } else { f64::NAN };
-        let mut axis_of_step = axis_in;
+        let mut carried = if prepared.outside { f64::INFINITY } else { f64::NAN };
         let mut last = None;
         loop {
             // Down to the leaf that holds the ray at t.
@@ -179,6 +195,7 @@ impl Caster {
             }
             // Its end.
             let sizes = if AXES == 3 { [size; 3] } else { [size, size, FULL] };
+            let shrink = sizes.map(|size| 1.0 / f64::from(size));
             let ends: [f64; 3] = std::array::from_fn(|axis| ray.at_plane(axis, f64::from(place[axis] + sizes[axis])));
             let axis_out = if ends[0] <= ends[1] {
                 if ends[0] <= ends[2] { 0 } else { 2 }
@@ -191,7 +208,10 @@ impl Caster {
             match Child::of(word) {
                 Child::Empty(inside) => {
                     if (carried < 0.0) != inside && !carried.is_nan() {
-                        let face = At::Face { axis: axis_of_step, entering: inside };
+                        // The face that was met last.
+                        let starts: [f64; 3] = std::array::from_fn(|axis| ray.at_plane(axis, f64::from(place[axis])));
+                        let axis = (0..3).fold(0, |last, axis| if starts[axis] > starts[last] { axis } else { last });
+                        let face = At::Face { axis, entering: inside };
                         return Some(Found { t, at: last.unwrap_or(face) });
                     }
                     (carried, last) = (if inside { f64::NEG_INFINITY } else { f64::INFINITY }, None);
@@ -199,7 +219,7 @@ impl Caster {
                 Child::Linear(number) => {
                     let corners = &self.corners[number as usize];
                     let at = At::Linear { number, place, size };
-                    let value = |t: f64| trilinear(corners, ray.local(t, place, sizes)) - self.distance;
+                    let value = |t: f64| trilinear(corners, ray.local(t, place, shrink)) - self.distance;
                     if CUBIC {
                         let step = (out - t) / 3.0;
                         let values = [value(t), value(t + step), value(out - step), value(out)];
@@ -228,7 +248,7 @@ impl Caster {
                     let cell = self.field.find(self.others[number as usize])?;
                     let extent = cell.extent();
                     let value = |t: f64| {
-                        let local = ray.local(t, place, sizes);
+                        let local = ray.local(t, place, shrink);
                         cell.value(extent.min + extent.size() * DVec3::from_array(local)) - self.distance
                     };
                     let entry = value(t);
@@ -255,7 +275,6 @@ impl Caster {
                 return (carried < 0.0).then_some(Found { t, at: face });
             }
             place[axis_out] = after;
-            axis_of_step = axis_out;
             let level = 31 - (before ^ after).leading_zeros();
             size = 1 << level;
             let mut octant = 0;
@@ -270,7 +289,7 @@ impl Caster {
     fn normal(&self, found: &Found, point: DVec3, direction: DVec3) -> DVec3 {
         let across = |axis: usize, entering: bool| {
             let mut normal = DVec3::ZERO;
-            normal[axis.min(2)] = if (direction[axis.min(2)] > 0.0) == entering { -1.0 } else { 1.0 };
+            normal[axis] = if (direction[axis] > 0.0) == entering { -1.0 } else { 1.0 };
             normal
         };
         let gradient = match found.at {

@@ -7,7 +7,7 @@ use super::shade::{darken, decode, facing, lit};
 use super::tile::{Area, Pattern, TILE};
 use super::{Canvas, NEIGHBOURHOOD, Picture, Samples, assemble, check, finish};
 use crate::error::Result;
-use crate::geom::DVec3;
+use crate::geom::{Aabb, DVec3};
 use crate::product::raycast::{Caster, Hit, Method};
 use crate::run::Run;
 
@@ -19,7 +19,7 @@ pub fn render_field(caster: &Caster, camera: &Camera, canvas: &Canvas, colour: R
     let view = View { caster, lens: camera.lens(canvas.width, canvas.height), colour, surface };
     let depth = view.depth(run)?;
     let openness = if canvas.occlusion > 0.0 && depth.iter().any(|d| d.is_finite()) {
-        let radius = NEIGHBOURHOOD * caster.solid().diagonal();
+        let radius = NEIGHBOURHOOD * Aabb::around(caster.outline(run)?).diagonal();
         Some(Openness::estimate(&view.lens, depth.clone(), radius, canvas.occlusion, run)?)
     } else {
         None
