@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from bench import alone, isosurfaces, models, peers, process, table, transforms
+from bench import alone, isosurfaces, models, peers, process, rays, table, transforms
 from bench.compare import compare
 from bench.settings import Settings
 
 COMPARED = ("dense", "winding", "band", "uniform", "near")
-ALL = (*COMPARED, *alone.JOBS, *transforms.JOBS, *isosurfaces.JOBS)
+ALL = (*COMPARED, *alone.JOBS, *transforms.JOBS, *isosurfaces.JOBS, *rays.JOBS)
 
 
 def main() -> None:

@@ -17,12 +17,12 @@ Rows = NDArray[np.float64]
 
 
 def rays(threads: int, repeats: int, volume: int) -> dict[str, Any]:
-    """Primary rays of a picture of a pot, thin-walled; `volume` is the transforms' own."""
+    """Primary rays of a picture of a casting; `volume` is the transforms' own."""
     import truefield as tf
 
     del volume
-    shape = pot()
-    field = tf.adaptive_field(shape, 1e-3, growth=np.inf, rule="samples", max_depth=9)
+    part = tf.shapes.housing()
+    field = tf.adaptive_field(part, 0.1, growth=np.inf, rule="samples", max_depth=8)
     mesh = field.surface(threads=threads)
     origins, directions = picture(*mesh.extent)
     works: dict[str, Callable[[], Rows]] = {
@@ -50,16 +50,6 @@ def rays(threads: int, repeats: int, volume: int) -> dict[str, Any]:
     counts = field.statistics()
     title = f"{len(origins)} rays, {threads} threads, {counts['leaves']} leaves or {len(mesh.triangles)} triangles"
     return {"title": title, "head": ["tool", "million a second", "hits", "median from cubic"], "rows": rows}
-
-
-def pot() -> Any:
-    """A bowl with a thin wall, a lid's knob and a ring for a handle, as the paper's teapot is thin."""
-    from truefield import csg
-
-    bowl = (csg.sphere(1.0) - csg.sphere(0.94)) - csg.box((2.2, 2.2, 1.0), center=(0.0, 0.0, 1.1))
-    knob = csg.sphere(0.12, center=(0.0, 0.0, 0.5))
-    handle = csg.sphere(0.4, center=(-1.1, 0.0, 0.0)) - csg.sphere(0.3, center=(-1.1, 0.0, 0.0))
-    return bowl | knob | (handle - csg.sphere(1.0))
 
 
 def picture(low: Rows, high: Rows) -> tuple[Rows, Rows]:

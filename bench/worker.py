@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bench import alone, isosurfaces, peers, transforms
+from bench import alone, isosurfaces, peers, rays, transforms
 from bench.clock import Clock, Peak
 from bench.lattice import Lattice
 
@@ -59,7 +59,7 @@ def compare(task: dict[str, Any]) -> dict[str, Any]:
 
 def make_table(task: dict[str, Any]) -> dict[str, Any]:
     """A job that makes its own table."""
-    of_volumes = {**transforms.JOBS, **isosurfaces.JOBS}
+    of_volumes = {**transforms.JOBS, **isosurfaces.JOBS, **rays.JOBS}
     if task["job"] in of_volumes:
         return of_volumes[task["job"]](task["threads"], task["repeats"], task["volume"])
     mesh = np.load(task["mesh"]) if task["mesh"] else None
@@ -70,7 +70,8 @@ def make_table(task: dict[str, Any]) -> dict[str, Any]:
 def main() -> None:
     path = Path(sys.argv[1])
     task = json.loads(path.read_text())
-    result = make_table(task) if task["job"] in {*alone.JOBS, *transforms.JOBS, *isosurfaces.JOBS} else compare(task)
+    alone_jobs = {*alone.JOBS, *transforms.JOBS, *isosurfaces.JOBS, *rays.JOBS}
+    result = make_table(task) if task["job"] in alone_jobs else compare(task)
     path.with_suffix(".result").write_text(json.dumps(result))
 
 

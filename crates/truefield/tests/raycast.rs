@@ -283,3 +283,33 @@ fn rays_that_cannot_be_are_refused() {
         assert!(caster.occluded(&one, &one, length, Method::Linear, &run).is_err());
     }
 }
+
+#[test]
+fn rays_side_by_side_meet_what_each_meets_alone() {
+    let mut random = Random::new(19);
+    for (round, shape) in [torus(0.7, 0.2), cuboid(DVec3::new(-0.5, -0.61, -0.72), DVec3::new(0.513, 0.4, 0.31))].iter().enumerate() {
+        let field = tree(shape, &near(0.003, 7));
+        let caster = caster(&field, 0.01);
+        for _ in 0..12 {
+            let forward = if round == 0 { random.direction() } else { DVec3::new(0.0, -1.0, 0.0) };
+            let [right, up] = [forward.any_orthonormal_vector(), forward.cross(forward.any_orthonormal_vector())];
+            // Every second picture in perspective.
+            let bend = if random.below(2) == 0 { 0.0 } else { 0.4 };
+            let mut rays = Vec::new();
+            for y in 0..64 {
+                for x in 0..64 {
+                    let across = right * (f64::from(x) / 32.0 - 1.0) + up * (f64::from(y) / 32.0 - 1.0);
+                    rays.push((across * (1.0 - bend) - forward * 2.0, forward + across * bend));
+                }
+            }
+            for method in METHODS {
+                let hits = cast(&caster, &rays, method);
+                for (&(origin, direction), hit) in rays.iter().zip(&hits) {
+                    let alone = caster.first(origin, (direction / direction.abs().max_element()).normalize(), f64::INFINITY, method);
+                    assert_eq!(alone.map_or(f64::INFINITY.to_bits(), |alone| alone.distance.to_bits()), hit.distance.to_bits());
+                    assert!(alone.is_none_or(|alone| alone == *hit));
+                }
+            }
+        }
+    }
+}
