@@ -41,6 +41,7 @@ __all__ = [
     "menger_sponge",
     "molecule",
     "occluded_rays",
+    "patch_shape",
     "render_field",
     "sample",
     "sample_marched",
