@@ -218,11 +218,11 @@ def field(
         threads: number of threads; all cores by default.
         progress: called as `progress(phase, fraction)`.
 
-    Next to smooth surface, `bounds` are within 1e-10 of the domain's diagonal: a foot is found by Newton's method, that
-    nothing is nearer is proven with intervals of second derivatives, that nothing is farther by a change of sign. At
-    kinks (of `minimum`, `maximum`, `absolute`) they are within 1e-4 of the diagonal, and slow. Where the formula
-    touches zero without a change of sign, surface cannot be told from none and bounds are wide; a sign that changes
-    through a pole counts as surface.
+    Next to smooth surface, `bounds` are within 1e-10 of the domain's diagonal, and within 1e-6 where several places are
+    nearly as far: a foot is found by Newton's method, that nothing is nearer is proven with intervals of second
+    derivatives, that nothing is farther by a change of sign. At kinks (of `minimum`, `maximum`, `absolute`) they are
+    within 1e-4 of the diagonal, and slow. Where the formula touches zero without a change of sign, surface cannot be
+    told from none and bounds are wide; a sign that changes through a pole counts as surface.
 
     Raises:
         TruefieldError: the domain is no finite box, or the formula is positive in all of it; when asked, the formula is

@@ -12,6 +12,9 @@ use crate::geom::{Aabb, DVec3};
 /// Boxes that one search makes at most, beside those of the tree.
 const MOST: usize = 20_000;
 
+/// Boxes of a search after which it is a hard one.
+const MANY: usize = 100;
+
 /// The box around a foot that is tried first, in sizes of the box it was found in, to either side.
 const WIDE: f64 = 1.5;
 
@@ -23,6 +26,8 @@ const SHRINKS: usize = 8;
 pub(super) struct Accuracy {
     /// Where it is smooth.
     pub smooth: f64,
+    /// Where it is smooth, and many places are nearly as far.
+    pub hard: f64,
     /// Where it has kinks, or meets itself.
     pub rough: f64,
 }
@@ -76,6 +81,8 @@ impl Ord for Entry {
 struct Piece {
     extent: Aabb,
     sheet: Option<Box<Sheet>>,
+    /// Whether a foot is worth looking for: every other time that a box is cut.
+    fresh: bool,
 }
 
 /// One search under way.
@@ -114,7 +121,7 @@ impl<'a> Search<'a> {
             self.enter(0.0, Place::Node(0));
         }
         while let Some(entry) = self.heap.pop() {
-            if entry.bound >= self.floor || entry.bound.max(0.0).sqrt() >= self.upper - self.accuracy.smooth {
+            if entry.bound >= self.floor || entry.bound.max(0.0).sqrt() >= self.upper - self.enough() {
                 self.floor = self.floor.min(entry.bound);
                 break;
             }
@@ -127,12 +134,12 @@ impl<'a> Search<'a> {
                 Place::Sheet(index) => {
                     let node = &self.boxes.nodes[index as usize];
                     let sheet = node.sheet.map(|sheet| &self.boxes.sheets[sheet as usize]);
-                    self.settle(entry.bound, &node.extent, sheet);
+                    self.settle(entry.bound, &node.extent, sheet, true);
                 }
                 Place::Piece(index) => {
-                    let Piece { extent, sheet } = &mut self.pieces[index as usize];
-                    let (extent, sheet) = (*extent, sheet.take());
-                    self.settle(entry.bound, &extent, sheet.as_deref());
+                    let Piece { extent, sheet, fresh } = &mut self.pieces[index as usize];
+                    let (extent, sheet, fresh) = (*extent, sheet.take(), *fresh);
+                    self.settle(entry.bound, &extent, sheet.as_deref(), fresh);
                 }
             }
         }
@@ -179,13 +186,13 @@ impl<'a> Search<'a> {
     }
 
     /// Proves how near the surface of a box is, or cuts the box.
-    fn settle(&mut self, bound: f64, extent: &Aabb, sheet: Option<&Sheet>) {
+    fn settle(&mut self, bound: f64, extent: &Aabb, sheet: Option<&Sheet>, fresh: bool) {
         if self.is_proven(extent) {
             return;
         }
         match sheet {
             Some(sheet) => {
-                if self.prove(bound, extent, sheet) || self.is_proven(extent) {
+                if (fresh || self.upper == f64::INFINITY) && (self.prove(bound, extent, sheet) || self.is_proven(extent)) {
                     return;
                 }
                 if extent.size().max_element() <= 0.125 * self.accuracy.smooth {
@@ -216,7 +223,7 @@ impl<'a> Search<'a> {
                 },
             };
             let bound = self.bound(&part, sheet.as_deref()).max(bound);
-            self.pieces.push(Piece { extent: part, sheet });
+            self.pieces.push(Piece { extent: part, sheet, fresh: !fresh });
             self.enter(bound, Place::Piece((self.pieces.len() - 1) as u32));
         }
     }
@@ -260,9 +267,14 @@ impl<'a> Search<'a> {
         self.accept(foot.proof(self.tape, self.p, sheet).max(bound), &sheet.reach)
     }
 
+    /// How far apart the bounds may be: where much of the surface is nearly as far, less is asked for.
+    fn enough(&self) -> f64 {
+        if self.pieces.len() < MANY { self.accuracy.smooth } else { self.accuracy.hard }
+    }
+
     /// Notes what is proven of the surface in a box, if that is as good as wanted.
     fn accept(&mut self, proof: f64, within: &Aabb) -> bool {
-        let good = proof.max(0.0).sqrt() >= self.upper - self.accuracy.smooth;
+        let good = proof.max(0.0).sqrt() >= self.upper - self.enough();
         if good {
             self.floor = self.floor.min(proof);
             self.proven.push(*within);

@@ -42,7 +42,7 @@ impl Implicit {
         let tape = Tape::new(expression)?;
         let boxes = Boxes::build(&tape, &domain, run)?.checked(&tape, &domain)?;
         let size = domain.diagonal() + f64::EPSILON.sqrt() * domain.min.abs().max(domain.max.abs()).max_element();
-        let accuracy = Accuracy { smooth: 1e-10 * size, rough: 1e-4 * size };
+        let accuracy = Accuracy { smooth: 1e-10 * size, hard: 1e-6 * size, rough: 1e-4 * size };
         let extent = boxes.solid;
         Ok(Self { tape, domain, boxes, accuracy, extent })
     }
@@ -197,6 +197,6 @@ impl Source for Implicit {
     }
 
     fn noise(&self) -> f64 {
-        if self.boxes.rough { self.accuracy.rough } else { self.accuracy.smooth }
+        if self.boxes.rough { self.accuracy.rough } else { self.accuracy.hard }
     }
 }
