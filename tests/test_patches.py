@@ -70,6 +70,15 @@ def test_each_part_of_the_teapot_closes_up_and_is_as_far_as_its_samples() -> Non
         assert ((low <= samples.min(axis=0)) & (samples.max(axis=0) <= high)).all()
 
 
+def test_the_teapot_is_one_solid() -> None:
+    teapot = patches.teapot()
+    # The body, the handle, the hole of the handle, the spout, beside it all.
+    p = [(0.0, 0.0, 1.0), (-2.42, 0.0, 1.9), (-2.1, 0.0, 1.4), (2.2, 0.0, 1.3), (2.2, 1.5, 1.3)]
+    assert (np.sign(teapot.distance(p)) == [-1, -1, 1, -1, 1]).all()
+    lower, upper = teapot.bounds(places(100, 3.0))
+    assert (lower <= upper).all()
+
+
 @pytest.mark.parametrize(
     ("controls", "words"),
     [

@@ -53,6 +53,12 @@ def surface(
     return Shape(native, f"patches.surface({len(array)} patches)")
 
 
+def teapot() -> Shape:
+    """The solid of `teapot_patches`: body, handle and spout put together."""
+    body, handle, spout = (surface(part) for part in teapot_patches())
+    return body | handle | spout
+
+
 def teapot_patches() -> tuple[Floats, Floats, Floats]:
     """The control points, (n, 4, 4, 3) each, of a teapot in the manner of the paper's: body with lid, handle and spout.
 
