@@ -1,6 +1,6 @@
 """Distance fields that people can trust: every distance comes with an interval that contains the truth."""
 
-from truefield import csg, implicit, patches, shapes
+from truefield import csg, implicit, patches, polygons, shapes
 from truefield._truefield import __version__
 from truefield.adaptive import AdaptiveField, RayHits, adaptive_field
 from truefield.check import MeshCheck
@@ -47,6 +47,7 @@ __all__ = [
     "implicit",
     "load",
     "patches",
+    "polygons",
     "read",
     "read_points",
     "read_volume",

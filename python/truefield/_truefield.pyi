@@ -472,6 +472,10 @@ class AdaptiveField:
         progress: _Progress = None,
     ) -> AdaptiveField: ...
     @property
+    def children(self) -> int: ...
+    @property
+    def mesh(self) -> tuple[_Floats, NDArray[np.int64], str] | None: ...
+    @property
     def extent(self) -> tuple[list[float], list[float]]: ...
     def statistics(self) -> dict[str, int]: ...
     def distance(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
@@ -480,6 +484,43 @@ class AdaptiveField:
     ) -> tuple[_Floats, _Floats]: ...
     def gradient(self, points: _Floats, threads: int | None = None, progress: _Progress = None) -> _Floats: ...
 
+def edit_field(
+    field: AdaptiveField,
+    tool: Shape,
+    operation: str,
+    radius: float,
+    path: _Floats | None,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> AdaptiveField: ...
+def level_of_detail(
+    field: AdaptiveField,
+    tolerance: float | None,
+    depth: int | None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> AdaptiveField: ...
+def merged_samples(
+    samples: SampledField,
+    tolerance: float,
+    growth: float,
+    max_depth: int,
+    memory: int,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> AdaptiveField: ...
+def polygon(loops: list[list[list[float]]], fill: str) -> Shape: ...
+def adaptive_field_levels(
+    field: AdaptiveField, threads: int | None = None, progress: _Progress = None
+) -> tuple[dict[str, Any], list[dict[str, NDArray[Any]]]]: ...
+def adaptive_field_from_levels(
+    about: dict[str, Any],
+    levels: list[dict[str, NDArray[Any]]],
+    surface: Surface | None,
+    threads: int | None = None,
+    progress: _Progress = None,
+) -> AdaptiveField: ...
 def cast_rays(
     field: AdaptiveField,
     origins: _Floats,

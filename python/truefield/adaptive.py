@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +15,7 @@ from truefield.errors import TruefieldError
 from truefield.fields import Part, Surface
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
+from truefield.sampled import SampledField
 from truefield.shape import Shape
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 Method = Literal["linear", "cubic", "exact"]
 Rule = Literal["verified", "samples"]
 Crossing = Literal["linear", "cubic"]
+Tool = Union[Part, Shape]
 
 _DEEPEST = 24
 
@@ -182,6 +184,130 @@ class AdaptiveField:
         )
         return TriangleMesh.trusted(vertices, triangles, np.array(low), np.array(high), "surface")
 
+    def carve(
+        self,
+        tool: Tool,
+        path: ArrayLike | None = None,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> AdaptiveField:
+        """The field without the tool: max(field, -tool), a new field; this one stays as it is.
+
+        Args:
+            tool: a part or a Shape.
+            path: (n, 3) points that the tool is moved to one after the other, its own coordinates added to each; and to
+                places between them a tenth of its shortest side apart.
+            memory: refuse to take more bytes for new cells; half the machine's memory by default.
+            threads: worker threads; the field never depends on them.
+            progress: called as `progress(phase, fraction)`.
+
+        Only cells that meet the tool's box, grown by half its longest side, are looked at; all others, and what memory
+        they are in, are shared by both fields. New cells keep to the field's tolerance and growth beside the old
+        values. `bounds` hold the distance of the carved solid everywhere, also far away, where its nearest point may
+        be gone; what is only bounded by a point inside says so. To undo, keep the old field.
+
+        Raises:
+            TruefieldError: the path has no points, or the field or the tool cannot be used.
+            MemoryError: the new cells would not fit.
+        """
+        return self._edited("carve", tool, 0.0, path, memory, threads, progress)
+
+    def fill(
+        self,
+        tool: Tool,
+        path: ArrayLike | None = None,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> AdaptiveField:
+        """The field with the tool added: min(field, tool); see `carve`."""
+        return self._edited("fill", tool, 0.0, path, memory, threads, progress)
+
+    def intersect(
+        self,
+        tool: Tool,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> AdaptiveField:
+        """What is in both: max(field, tool). All of the domain is looked at; see `carve`."""
+        return self._edited("intersect", tool, 0.0, None, memory, threads, progress)
+
+    def blend(
+        self,
+        tool: Tool,
+        radius: float,
+        *,
+        memory: int | None = None,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> AdaptiveField:
+        """The field with the tool added and the seam filled by a parabola, where both differ by less than `radius`.
+
+        min(field, tool) - h^2 / (4 radius), h = radius - |field - tool| where that is positive; see `carve`.
+        """
+        return self._edited("blend", tool, arguments.length("radius", radius), None, memory, threads, progress)
+
+    def level_of_detail(
+        self,
+        tolerance: float | None = None,
+        depth: int | None = None,
+        *,
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> AdaptiveField:
+        """A coarser field, by cutting the tree; no source is asked.
+
+        Args:
+            tolerance: leaves are the first cells whose error is at most this at the surface, model units, and grows
+                with the distance from it as the field's own may; or
+            depth: leaves are no deeper than this; 0 is one cell.
+            threads: worker threads.
+            progress: called as `progress(phase, fraction)`.
+
+        Every cell keeps its error, so that `bounds` still hold the true distance; coarser cells never promise more.
+
+        Raises:
+            TruefieldError: both are given, or none, or one that cannot be used.
+        """
+        error = None if tolerance is None else arguments.length("tolerance", tolerance)
+        deepest = None if depth is None else min(_DEEPEST, arguments.count("depth", depth, least=0))
+        return AdaptiveField(_truefield.level_of_detail(self._native, error, deepest, threads, progress))
+
+    def save(self, path: PathLike, *, threads: int | None = None, progress: Progress | None = None) -> None:
+        """Writes the field to one file, by custom named `.tfield`, level by level; `truefield.load` reads it.
+
+        The first levels are a coarser field: `truefield.load(path, depth=k)` reads no more of the file than those. The
+        loaded field answers the same, bit for bit. The file appears whole or not at all, with checksums for every
+        level.
+
+        Raises:
+            FileError: the file cannot be written.
+        """
+        from truefield import storage
+
+        storage.save(self, path, threads=threads, progress=progress)
+
+    def _edited(
+        self,
+        operation: str,
+        tool: Tool,
+        radius: float,
+        path: ArrayLike | None,
+        memory: int | None,
+        threads: int | None,
+        progress: Progress | None,
+    ) -> AdaptiveField:
+        places = None if path is None else arguments.points(path if np.size(path) else np.empty((0, 3)))
+        native = _truefield.edit_field(
+            self._native, _shape(tool)._native, operation, radius, places, arguments.memory(memory), threads, progress
+        )
+        return AdaptiveField(native)
+
     def render(self, path: PathLike | None = None, **how: Any) -> Image.Image:
         """A picture of the field by rays; see `truefield.pictures.field_picture` for what it takes."""
         from truefield.pictures import field_picture
@@ -195,7 +321,7 @@ class AdaptiveField:
 
 
 def adaptive_field(
-    part: Part | Shape,
+    part: Part | Shape | SampledField,
     tolerance: float | None = None,
     *,
     growth: float = 0.05,
@@ -210,7 +336,9 @@ def adaptive_field(
     """The adaptively sampled field of a part or shape (Frisken, Perry, Rockwood and Jones 2000).
 
     Args:
-        part: a mesh, a Surface or a Shape.
+        part: a mesh, a Surface or a Shape; or a SampledField, whose cells are merged where one says the same as eight
+            within the tolerance (bottom up; its errors are those of the samples, `max_depth` may not be less than they
+            need, and `domain`, `method` and `rule` do not matter).
         tolerance: the largest error at the surface, model units. Exact leaves have none: they do without, and edits of
             them then keep to a thousandth of the part's longest side.
         growth: how much the error may grow per unit of distance from the surface; infinite divides only cells that
@@ -244,6 +372,17 @@ def adaptive_field(
         tolerance = 1e-3 * float(np.max(high - low))
     error, slope = arguments.length("tolerance", tolerance), arguments.number("growth", growth)
     room = arguments.memory(memory)
+    if isinstance(surface, SampledField):
+        merged = _truefield.merged_samples(
+            surface._native,
+            error,
+            slope,
+            deepest,
+            room,
+            threads,
+            progress,
+        )
+        return AdaptiveField(merged)
     shape = _shape(surface)
     if isinstance(surface, Surface) and method != "cubic":
         native = _truefield.AdaptiveField.of_surface(

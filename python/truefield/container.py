@@ -12,6 +12,8 @@ Layout of a `.tfield` file, version 1, everything little endian:
 | 32 | BLAKE2b-256 of everything before |
 | | the arrays, one after another, as the header's `arrays` lists them: name, type, shape |
 | 32 | BLAKE2b-256 of everything before |
+
+A header may have `sums`: the BLAKE2b-256 of each array, so that the first ones can be checked without the rest.
 """
 
 from __future__ import annotations
@@ -59,6 +61,8 @@ def write(path: PathLike, header: Header, arrays: Mapping[str, NDArray[Any]], pr
     """
     check_file(path)
     listed = [[name, array.dtype.str, list(array.shape)] for name, array in arrays.items()]
+    if header.get("sums"):
+        header = header | {"sums": {name: _sum(_bytes(array)) for name, array in arrays.items()}}
     text = json.dumps(header | {"arrays": listed}).encode("ascii")
     text += b" " * (-len(text) % 8)
     size = _START.size + len(text) + 2 * _DIGEST + sum(array.nbytes for array in arrays.values())
@@ -72,17 +76,24 @@ def write(path: PathLike, header: Header, arrays: Mapping[str, NDArray[Any]], pr
         writer.seal()
 
 
-def read(file: Path, check: Callable[[Header], Mapping[str, Kept]], progress: Progress | None) -> tuple[Header, Arrays]:
+def read(
+    file: Path,
+    check: Callable[[Header], Mapping[str, Kept]],
+    progress: Progress | None,
+    first: Callable[[Header], int] | None = None,
+) -> tuple[Header, Arrays]:
     """Header and arrays of a file, every length and checksum verified.
 
     `check` is given the header, raises `ValueError` where one of its values cannot be, and says which arrays belong.
+    With `first`, which says how many, no more than the first arrays are read, each by the checksum that the header of
+    a file written with `sums` has of it; the rest of the file may be missing.
 
     Raises:
         FileError: the file cannot be read, is none of its kind, truncated, damaged, or from a newer truefield.
     """
     try:
         with file.open("rb") as stream:
-            return _read(stream, file, check, progress)
+            return _read(stream, file, check, progress, first)
     except FileNotFoundError:
         raise FileError(f"cannot read '{file}': there is no such file; check the name") from None
     except IsADirectoryError:
@@ -145,7 +156,11 @@ class _Reader:
 
 
 def _read(
-    stream: BufferedReader, file: Path, check: Callable[[Header], Mapping[str, Kept]], progress: Progress | None
+    stream: BufferedReader,
+    file: Path,
+    check: Callable[[Header], Mapping[str, Kept]],
+    progress: Progress | None,
+    first: Callable[[Header], int] | None,
 ) -> tuple[Header, Arrays]:
     state = os.fstat(stream.fileno())
     if not stat.S_ISREG(state.st_mode):
@@ -165,7 +180,7 @@ def _read(
             f"'{file}' was written by a newer truefield, in version {version} of the format, but this one reads "
             f"version {VERSION}; upgrade truefield"
         )
-    if state.st_size < size:
+    if state.st_size < size and (first is None or state.st_size < _START.size + header_size + _DIGEST):
         raise _truncated(file, state.st_size, size)
     if version < 1 or state.st_size > size or _START.size + header_size + 2 * _DIGEST > size:
         raise _damaged(file)
@@ -180,11 +195,20 @@ def _read(
     if _START.size + header_size + 2 * _DIGEST + expected != size:
         raise FileError(f"'{file}' is no valid field: its arrays do not fill it; save it again")
     arrays: Arrays = {}
-    for name, (dtype, _) in kept.items():
+    sums = header.get("sums", {}) if first is not None else {}
+    left = state.st_size - _START.size - header_size - _DIGEST
+    wanted = len(kept) if first is None else first(header)
+    for name, (dtype, _) in list(kept.items())[:wanted]:
+        left -= np.dtype(dtype).itemsize * _product(shapes[name])
+        if left < 0:
+            raise _truncated(file, state.st_size, size)
         array = np.empty(shapes[name], dtype)
         reader.fill(_bytes(array))
+        if first is not None and sums.get(name) != _sum(_bytes(array)):
+            raise _damaged(file)
         arrays[name] = array.astype(array.dtype.newbyteorder("="), copy=False)
-    reader.check()
+    if first is None:
+        reader.check()
     return header, arrays
 
 
@@ -215,6 +239,10 @@ def expect(header: Header, key: str, good: Callable[[Any], bool]) -> None:
 def three(value: Any, kind: type) -> bool:
     """Whether it is a list of three of a kind."""
     return isinstance(value, list) and len(value) == 3 and all(type(item) is kind for item in value)
+
+
+def _sum(view: memoryview) -> str:
+    return hashlib.blake2b(view, digest_size=_DIGEST).hexdigest()
 
 
 def _bytes(array: NDArray[Any]) -> memoryview:

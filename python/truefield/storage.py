@@ -11,17 +11,29 @@ A sampled field's header has `kind` "sampled", `origin`, `spacing` and `shape` o
 known, with its `length` (null: infinite): "exact" within a band, "error" of every sample, or "bounds"; and
 `continuous`: whether the sign changes at the surface only. Its arrays are flat, x slowest: the numbers of `doubtful`
 samples, `values`, `lower` and `upper` (empty but for "bounds").
+
+An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4), `continuous`,
+`tolerance`, `growth` (null: infinite) and `max_depth` that edits go on to ask, the number of `levels`, `sign_rule` of
+the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles` of the mesh whose triangles
+exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has them; then, for each level n
+from the root down, `records_n`, ten numbers for each cell (the values at its corners, lower and upper error),
+`cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of exact leaves, and `kinds_n`
+of the cells: 0 with children, which are all in the next level, in order; 1 trilinear, 2 tricubic, 3 exact. The levels
+from the first to any are a field.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final, get_args
 
 import numpy as np
 
-from truefield import _truefield, container
+from numpy.typing import NDArray
+
+from truefield import _truefield, arguments, container
+from truefield.adaptive import AdaptiveField
 from truefield.arguments import Progress
 from truefield.container import Arrays, Header, Kept, expect, three
 from truefield.errors import FileError, TruefieldError
@@ -43,17 +55,27 @@ _COMPLETE: Final = {
     "entries": Kept("|u1"),
     "varied": Kept("|u1"),
 }
+_ADAPTIVE: Final = {"vertices": Kept("<f8", rows=True), "mesh_triangles": Kept("<u4", rows=True), "edits": Kept("<f8")}
+_LEVEL: Final = {
+    "records": Kept("<f4"),
+    "cubics": Kept("<f4"),
+    "ends": Kept("<u4"),
+    "triangles": Kept("<u4"),
+    "kinds": Kept("|u1"),
+    "sides": Kept("|u1"),
+}
+_MOST_LEVELS: Final = 25
 _SAMPLED: Final = {"doubtful": Kept("<u8"), "values": Kept("<f4"), "lower": Kept("<f4"), "upper": Kept("<f4")}
 
 
 def save(
-    field: CompleteField | SampledField,
+    field: AdaptiveField | CompleteField | SampledField,
     path: PathLike,
     *,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> None:
-    """Writes a field to one file, for `load`; see `CompleteField.save` and `SampledField.save`."""
+    """Writes a field to one file, for `load`; see the `save` of its kind."""
     arrays: Arrays
     if isinstance(field, CompleteField):
         surface, mesh = field.surface, field.mesh
@@ -71,6 +93,9 @@ def save(
         arrays = {"vertices": mesh.vertices, "mesh_triangles": mesh.triangles}
         arrays |= _truefield.complete_field_parts(field._native, threads, progress)
         kept = _COMPLETE
+    elif isinstance(field, AdaptiveField):
+        header, arrays = _adaptive_parts(field, threads, progress)
+        kept = _adaptive_kept(header["levels"])
     else:
         known, length, doubtful = field._native.known
         header = {
@@ -92,9 +117,12 @@ def save(
 
 
 def load(
-    path: PathLike, *, threads: int | None = None, progress: Progress | None = None
-) -> CompleteField | SampledField:
-    """Reads a field that `save` wrote: a complete or a sampled one, with the same answers, bit for bit.
+    path: PathLike, *, depth: int | None = None, threads: int | None = None, progress: Progress | None = None
+) -> AdaptiveField | CompleteField | SampledField:
+    """Reads a field that `save` wrote: a complete, sampled or adaptive one, with the same answers, bit for bit.
+
+    With `depth`, no more of an adaptive field is read than cells down to that depth: a coarser field, from the first
+    part of the file, of which the rest may be missing.
 
     The whole file is checked, by length, checksums and every index in it, before anything is answered. Takes no more
     than twice the memory of the field, and the time to read the file and, for a complete field, to make the surface's
@@ -107,8 +135,19 @@ def load(
     if threads is not None and threads < 1:
         raise TruefieldError(f"threads must be at least 1, or None for all cores, not {threads}")
     file = Path(path)
-    header, arrays = container.read(file, _checked, progress)
+    first: Callable[[Header], int] | None = None
+    if depth is not None:
+        deepest = arguments.count("depth", depth, least=0)
+
+        def first(header: Header) -> int:
+            if _kind(header) != "adaptive":
+                raise FileError(f"'{file}' is no adaptive field, so it has no levels; load it without depth")
+            return len(_ADAPTIVE) + len(_LEVEL) * min(deepest + 1, header["levels"])
+
+    header, arrays = container.read(file, _checked, progress, first)
     try:
+        if _kind(header) == "adaptive":
+            return _adaptive(file, header, arrays, threads, progress)
         if _kind(header) == "sampled":
             return _sampled(header, arrays)
         return _complete(file, header, arrays, threads, progress)
@@ -142,6 +181,45 @@ def _complete(
     return CompleteField(native, surface)
 
 
+def _adaptive_kept(levels: int) -> dict[str, Kept]:
+    return _ADAPTIVE | {f"{name}_{level}": kept for level in range(levels) for name, kept in _LEVEL.items()}
+
+
+def _adaptive_parts(
+    field: AdaptiveField, threads: int | None, progress: Progress | None
+) -> tuple[Header, dict[str, NDArray[Any]]]:
+    about, levels = _truefield.adaptive_field_levels(field._native, threads, progress)
+    mesh = field._native.mesh
+    vertices, triangles, rule = mesh or (np.empty((0, 3)), np.empty((0, 3), np.int64), None)
+    arrays = {"vertices": vertices, "mesh_triangles": triangles, "edits": about.pop("edits")}
+    arrays |= {f"{name}_{number}": level[name] for number, level in enumerate(levels) for name in _LEVEL}
+    growth = about.pop("growth")
+    header = {
+        "kind": "adaptive",
+        **about,
+        "growth": growth if np.isfinite(growth) else None,
+        "levels": len(levels),
+        "sign_rule": rule,
+        "sums": True,
+    }
+    return header, arrays
+
+
+def _adaptive(
+    file: Path, header: Header, arrays: Arrays, threads: int | None, progress: Progress | None
+) -> AdaptiveField:
+    surface = None
+    if header["sign_rule"] is not None:
+        mesh = TriangleMesh(arrays["vertices"], arrays["mesh_triangles"].astype(np.int64))
+        surface = Surface(mesh, header["sign_rule"], threads=threads, progress=progress)._native
+    names = ("extent", "children", "continuous", "tolerance", "max_depth")
+    growth = np.inf if header["growth"] is None else header["growth"]
+    about = {name: header[name] for name in names} | {"growth": growth, "edits": arrays["edits"]}
+    read = sum(name.startswith("records_") for name in arrays)
+    levels = [{name: arrays[f"{name}_{number}"] for name in _LEVEL} for number in range(read)]
+    return AdaptiveField(_truefield.adaptive_field_from_levels(about, levels, surface, threads, progress))
+
+
 def _sampled(header: Header, arrays: Arrays) -> SampledField:
     shape, length = header["shape"], np.inf if header["length"] is None else header["length"]
     counts = {name: arrays[name].size for name in ("values", "lower", "upper")}
@@ -167,8 +245,19 @@ def _kind(header: Header) -> str:
 def _checked(header: Header) -> Mapping[str, Kept]:
     """The arrays of the kind of field that the header names, if each of its values is as it must be."""
     kind = _kind(header)
-    if kind not in ("complete", "sampled"):
+    if kind not in ("adaptive", "complete", "sampled"):
         raise ValueError(f"kind is {kind!r:.80}")
+    if kind == "adaptive":
+        expect(header, "extent", lambda box: isinstance(box, list) and len(box) == 2 and all(three(c, float) for c in box))
+        expect(header, "children", lambda children: children in (4, 8))
+        expect(header, "continuous", lambda continuous: isinstance(continuous, bool))
+        expect(header, "tolerance", lambda tolerance: isinstance(tolerance, float))
+        expect(header, "growth", lambda growth: growth is None or isinstance(growth, float))
+        expect(header, "max_depth", lambda depth: type(depth) is int and 0 <= depth < _MOST_LEVELS)
+        expect(header, "levels", lambda levels: type(levels) is int and 0 < levels <= _MOST_LEVELS)
+        expect(header, "sign_rule", lambda rule: rule is None or rule in get_args(Sign))
+        expect(header, "sums", lambda sums: isinstance(sums, dict))
+        return _adaptive_kept(header["levels"])
     expect(header, "origin", lambda origin: three(origin, float))
     expect(header, "shape", lambda shape: three(shape, int) and all(0 < n < 2**32 for n in shape))
     if kind == "sampled":

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truefield::build::adaptive::{Leaves, Reconstruction, Rule, Rules, adaptive, adaptive_mesh, root};
@@ -13,9 +13,10 @@ use truefield::{Aabb, Error, Run};
 use crate::convert::{column, points, rows};
 use crate::door::{job, raise};
 use crate::shape::PyShape;
-use crate::surface::{PySurface, interval_arrays};
+use crate::surface::{PySurface, interval_arrays, sign_name};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
+type MeshOf<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, &'static str);
 
 /// An adaptively sampled field; see `truefield.AdaptiveField`.
 #[pyclass(name = "AdaptiveField", module = "truefield._truefield", frozen)]
@@ -86,7 +87,9 @@ impl PyAdaptiveField {
         let rules = Rules { tolerance, growth, max_depth, rule: self::rule(rule)?, reconstruction: reconstruction(method)?, memory };
         let domain = domain.map(|(low, high)| Aabb::new(low.into(), high.into()));
         let source = Arc::clone(&shape.0);
-        let field = job(py, threads, progress, |run| adaptive(&*source, root(&*source, domain, Division::Octree)?, &rules, run))?;
+        let field = job(py, threads, progress, |run| {
+            adaptive(&*source, root(&*source, domain, if source.is_flat() { Division::Quadtree } else { Division::Octree })?, &rules, run)
+        })?;
         Ok(Self::of(field))
     }
 
@@ -116,6 +119,23 @@ impl PyAdaptiveField {
         let source = &surface.0;
         let made = job(py, threads, progress, |run| adaptive_mesh(source, root(&**source, domain, Division::Octree)?, leaves, &rules, run));
         Ok(Self::of(made?))
+    }
+
+    /// Children of a cell: 8, or 4 in a quadtree.
+    #[getter]
+    fn children(&self) -> usize {
+        self.field.division().children()
+    }
+
+    /// `(vertices, triangles, sign rule)` of the mesh whose triangles exact leaves name.
+    #[getter]
+    fn mesh<'py>(&self, py: Python<'py>) -> PyResult<Option<MeshOf<'py>>> {
+        let Some(surface) = self.field.surface() else { return Ok(None) };
+        let mesh = surface.mesh();
+        let triangles: Vec<i64> = mesh.triangles().iter().flatten().map(|&v| i64::from(v)).collect();
+        let count = mesh.triangles().len();
+        let triangles = triangles.into_pyarray(py).reshape([count, 3])?;
+        Ok(Some((rows(py, mesh.vertices().iter().copied())?, triangles, sign_name(surface.sign_rule().kind))))
     }
 
     /// Lowest and highest corner of the domain.

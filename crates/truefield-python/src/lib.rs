@@ -9,6 +9,7 @@ mod contour;
 mod convert;
 mod csg;
 mod door;
+mod edit;
 mod field;
 mod implicit;
 mod marching;
@@ -74,5 +75,11 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(csg::difference_of, module)?)?;
     module.add_function(wrap_pyfunction!(csg::tube, module)?)?;
     module.add_function(wrap_pyfunction!(csg::sweep, module)?)?;
+    module.add_function(wrap_pyfunction!(edit::edit_field, module)?)?;
+    module.add_function(wrap_pyfunction!(edit::less_detail, module)?)?;
+    module.add_function(wrap_pyfunction!(edit::merged_samples, module)?)?;
+    module.add_function(wrap_pyfunction!(edit::polygon, module)?)?;
+    module.add_function(wrap_pyfunction!(edit::levels_of, module)?)?;
+    module.add_function(wrap_pyfunction!(edit::field_of_levels, module)?)?;
     Ok(())
 }

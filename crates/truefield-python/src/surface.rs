@@ -32,6 +32,15 @@ pub fn sign_choice(name: &str) -> PyResult<SignChoice> {
     })
 }
 
+/// The name of a rule.
+pub fn sign_name(kind: SignKind) -> &'static str {
+    match kind {
+        SignKind::Pseudonormal => "pseudonormal",
+        SignKind::Winding => "winding",
+        SignKind::Unsigned => "unsigned",
+    }
+}
+
 #[pymethods]
 impl PySurface {
     #[new]
@@ -52,12 +61,7 @@ impl PySurface {
     #[getter]
     fn sign_rule(&self) -> (&'static str, String) {
         let rule = self.0.sign_rule();
-        let name = match rule.kind {
-            SignKind::Pseudonormal => "pseudonormal",
-            SignKind::Winding => "winding",
-            SignKind::Unsigned => "unsigned",
-        };
-        (name, rule.reason.clone())
+        (sign_name(rule.kind), rule.reason.clone())
     }
 
     #[pyo3(signature = (points, threads=None, progress=None))]

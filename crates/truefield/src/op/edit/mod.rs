@@ -6,9 +6,11 @@
 
 mod divide;
 mod operation;
+mod path;
 mod settle;
 
 pub use operation::Operation;
+pub use path::edit_along;
 
 use crate::distance::{Distance, Source};
 use crate::error::{Error, Result};
@@ -22,9 +24,6 @@ use divide::{Divider, State};
 /// How far beyond a tool cells are sampled anew, as a part of its longest side.
 const REACH: f64 = 0.5;
 
-/// No more boxes of one tool are told apart.
-const BOXES: usize = 64;
-
 /// The field edited with a tool; `memory` is what the new cells may take while they are made.
 ///
 /// Cells that do not meet the tool's box, grown by half its longest side, stay bit for bit. Inside, the field holds the
@@ -34,19 +33,6 @@ const BOXES: usize = 64;
 ///
 /// Refuses fields of meshes with openings, and a quadtree any tool that depends on z.
 pub fn edit(field: &AdaptiveField, tool: &dyn Source, operation: Operation, memory: u64, run: &Run<'_>) -> Result<AdaptiveField> {
-    let everywhere = Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
-    edit_within(field, tool, operation, &[tool.extent().unwrap_or(everywhere)], memory, run)
-}
-
-/// [`edit`], where boxes are known that hold the tool together, as along a path.
-pub fn edit_within(
-    field: &AdaptiveField,
-    tool: &dyn Source,
-    operation: Operation,
-    boxes: &[Aabb],
-    memory: u64,
-    run: &Run<'_>,
-) -> Result<AdaptiveField> {
     operation.check()?;
     if field.continuity() == Continuity::ExceptOpenings {
         return Err(Error::invalid(
@@ -57,7 +43,7 @@ pub fn edit_within(
         return Err(Error::invalid("the field does not depend on z; give a tool that does not either, as a polygon"));
     }
     let turned = operation.turned();
-    let fresh = edits(operation, turned.smooth, boxes);
+    let fresh = [fresh(operation, turned.smooth, tool.extent())];
     // Nothing of the tool is on the side that it changes.
     let idle = |edit: &Edit| {
         edit.extent.min.is_finite() && edit.extent.max.is_finite() && turned.field_range(field.over(&edit.extent)).lower > 0.0
@@ -80,7 +66,7 @@ pub fn edit_within(
             !fresh.iter().any(|fresh| fresh.extent.contains(anchor)) || settle::is_certain(&pieces, field, change, edit.change, anchor)
         });
     }
-    for edit in fresh.iter() {
+    for edit in &fresh {
         let place = edit.extent.min.max(field.extent_box().min).midpoint(edit.extent.max.min(field.extent_box().max));
         all.push(Edit { anchor: settle::nearest_inside(&pieces, place), ..*edit });
     }
@@ -89,21 +75,14 @@ pub fn edit_within(
     Patch { old: field, cells, edits }.field(run)
 }
 
-/// The edits that a tool in these boxes makes.
-fn edits(operation: Operation, smooth: f64, boxes: &[Aabb]) -> Vec<Edit> {
+/// What a tool in a box does, or anywhere where it has none.
+fn fresh(operation: Operation, smooth: f64, extent: Option<Aabb>) -> Edit {
     let change = operation.change();
-    if operation == Operation::Intersect {
-        let everywhere = Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
-        return vec![Edit { change, extent: everywhere, reach: everywhere, anchor: None }];
-    }
-    let together = boxes.len().div_ceil(BOXES).max(1);
-    let hulls = boxes.chunks(together).map(|boxes| boxes.iter().fold(Aabb::EMPTY, |hull, b| hull.union(*b)));
-    hulls
-        .map(|hull| {
-            let extent = hull.grow(smooth);
-            let sides = extent.size();
-            let margin = (0..3).map(|axis| sides[axis]).filter(|side| side.is_finite()).fold(0.0, f64::max);
-            Edit { change, extent, reach: extent.grow(REACH * margin), anchor: None }
-        })
-        .collect()
+    let everywhere = Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY);
+    let (Some(extent), true) = (extent, operation != Operation::Intersect) else {
+        return Edit { change, extent: everywhere, reach: everywhere, anchor: None };
+    };
+    let extent = extent.grow(smooth);
+    let longest = extent.size().to_array().into_iter().filter(|side| side.is_finite()).fold(0.0, f64::max);
+    Edit { change, extent, reach: extent.grow(REACH * longest), anchor: None }
 }

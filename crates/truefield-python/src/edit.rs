@@ -1,0 +1,243 @@
+//! Adaptive fields edited, cut to less detail, made of samples, and as arrays for files.
+
+use std::sync::Arc;
+
+use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use truefield::build::adaptive::{Rules, coalesce};
+use truefield::field::adaptive::{
+    Accuracy, AdaptiveField, Change, Division, Edit, Edits, Level, LevelKind, Levels, ListSide, Lists, Record, Root,
+};
+use truefield::op::edit::{Operation, edit, edit_along};
+use truefield::op::level_of_detail::{Detail, level_of_detail};
+use truefield::source::polygon::{Fill, Polygon};
+use truefield::{Aabb, Continuity, DVec3, Error};
+
+use crate::adaptive::PyAdaptiveField;
+use crate::convert::points;
+use crate::door::{job, raise};
+use crate::sampled::PySampledField;
+use crate::shape::PyShape;
+use crate::surface::PySurface;
+
+/// Numbers of a cell in a file: eight corners, lower and upper error.
+const RECORD: usize = 10;
+
+/// Numbers of an edit in a file: 0 where the shape shrank or 1 where it grew, two boxes and an anchor.
+const EDIT: usize = 16;
+
+/// The field edited with a tool, or with the tool at every place of a path.
+#[pyfunction]
+#[pyo3(signature = (field, tool, operation, radius, path, memory, threads=None, progress=None))]
+pub fn edit_field(
+    py: Python<'_>,
+    field: &PyAdaptiveField,
+    tool: &PyShape,
+    operation: &str,
+    radius: f64,
+    path: Option<PyReadonlyArray2<'_, f64>>,
+    memory: u64,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyAdaptiveField> {
+    let operation = match operation {
+        "carve" => Operation::Carve,
+        "fill" => Operation::Fill,
+        "intersect" => Operation::Intersect,
+        "blend" => Operation::Blend(radius),
+        _ => {
+            return Err(raise(Error::invalid(format!(
+                "operation is {operation:?}; choose \"carve\", \"fill\", \"intersect\" or \"blend\""
+            ))));
+        }
+    };
+    let path = path.map(|path| points(&path)).transpose()?;
+    let (field, tool) = (&field.field, Arc::clone(&tool.0));
+    let edited = job(py, threads, progress, |run| match &path {
+        Some(path) => edit_along(field, &*tool, operation, path, memory, run),
+        None => edit(field, &*tool, operation, memory, run),
+    })?;
+    Ok(PyAdaptiveField::of(edited))
+}
+
+/// The field cut below cells that are good enough, or below a depth.
+#[pyfunction]
+#[pyo3(name = "level_of_detail", signature = (field, tolerance, depth, threads=None, progress=None))]
+pub fn less_detail(
+    py: Python<'_>,
+    field: &PyAdaptiveField,
+    tolerance: Option<f64>,
+    depth: Option<u32>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyAdaptiveField> {
+    let detail = match (tolerance, depth) {
+        (Some(tolerance), None) => Detail::Tolerance(tolerance),
+        (None, Some(depth)) => Detail::Depth(depth),
+        _ => return Err(raise(Error::invalid("give a tolerance or a depth, one of both"))),
+    };
+    let field = &field.field;
+    Ok(PyAdaptiveField::of(job(py, threads, progress, |run| level_of_detail(field, detail, run))?))
+}
+
+/// The adaptive field of samples.
+#[pyfunction]
+#[pyo3(signature = (samples, tolerance, growth, max_depth, memory, threads=None, progress=None))]
+pub fn merged_samples(
+    py: Python<'_>,
+    samples: &PySampledField,
+    tolerance: f64,
+    growth: f64,
+    max_depth: u32,
+    memory: u64,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyAdaptiveField> {
+    let rules = Rules { growth, max_depth, memory, ..Rules::within(tolerance) };
+    let samples = &samples.0;
+    Ok(PyAdaptiveField::of(job(py, threads, progress, |run| coalesce(samples, &rules, run))?))
+}
+
+/// Loops of corners in the plane, as a shape that is the same at every height.
+#[pyfunction]
+pub fn polygon(loops: Vec<Vec<[f64; 2]>>, fill: &str) -> PyResult<PyShape> {
+    let fill = match fill {
+        "even_odd" => Fill::EvenOdd,
+        "winding" => Fill::Winding,
+        _ => return Err(raise(Error::invalid(format!("fill is {fill:?}; choose \"even_odd\" or \"winding\"")))),
+    };
+    Polygon::new(&loops, fill).map(PyShape::of).map_err(raise)
+}
+
+/// Everything of a field: a dictionary of what is said once, and one of arrays for every level.
+#[pyfunction]
+#[pyo3(name = "adaptive_field_levels", signature = (field, threads=None, progress=None))]
+pub fn levels_of<'py>(
+    py: Python<'py>,
+    field: &PyAdaptiveField,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyList>)> {
+    let inner = &field.field;
+    let levels = job(py, threads, progress, |_| Ok(inner.to_levels()))?;
+    let about = PyDict::new(py);
+    about.set_item("extent", [levels.root.extent.min.to_array(), levels.root.extent.max.to_array()])?;
+    about.set_item("children", levels.root.division.children())?;
+    about.set_item("continuous", levels.continuity == Continuity::Everywhere)?;
+    about.set_item("tolerance", levels.accuracy.tolerance)?;
+    about.set_item("growth", levels.accuracy.growth)?;
+    about.set_item("max_depth", levels.accuracy.max_depth)?;
+    let edits: Vec<f64> = levels.edits.list().iter().flat_map(written).collect();
+    about.set_item("edits", edits.into_pyarray(py))?;
+    let out = PyList::empty(py);
+    for level in levels.levels {
+        let one = PyDict::new(py);
+        let records = level.records.iter().flat_map(|r| r.corners.into_iter().chain([r.lower, r.upper]));
+        one.set_item("records", records.collect::<Vec<f32>>().into_pyarray(py))?;
+        one.set_item("cubics", level.cubics.into_flattened().into_pyarray(py))?;
+        one.set_item("ends", level.lists.ends.into_pyarray(py))?;
+        one.set_item("triangles", level.lists.triangles.into_pyarray(py))?;
+        one.set_item("kinds", level.kinds.iter().map(|kind| *kind as u8).collect::<Vec<u8>>().into_pyarray(py))?;
+        one.set_item("sides", level.lists.sides.iter().map(|side| *side as u8).collect::<Vec<u8>>().into_pyarray(py))?;
+        out.append(one)?;
+    }
+    Ok((about, out))
+}
+
+/// The field that such dictionaries describe; what is deeper than the last level given was left out.
+#[pyfunction]
+#[pyo3(name = "adaptive_field_from_levels", signature = (about, levels, surface, threads=None, progress=None))]
+pub fn field_of_levels(
+    py: Python<'_>,
+    about: &Bound<'_, PyDict>,
+    levels: &Bound<'_, PyList>,
+    surface: Option<&PySurface>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<PyAdaptiveField> {
+    let [min, max]: [[f64; 3]; 2] = said(about, "extent")?;
+    let root =
+        Root { extent: Aabb::new(min.into(), max.into()), division: Division::with_children(said(about, "children")?).map_err(raise)? };
+    let continuity = if said(about, "continuous")? { Continuity::Everywhere } else { Continuity::ExceptOpenings };
+    let accuracy = Accuracy { tolerance: said(about, "tolerance")?, growth: said(about, "growth")?, max_depth: said(about, "max_depth")? };
+    let mut all = Levels::new(root, continuity, accuracy);
+    let edits: Vec<f64> = array(about, "edits")?;
+    all.edits = Edits::new(edits.chunks(EDIT).map(read).collect::<truefield::Result<_>>().map_err(raise)?);
+    for level in levels.iter() {
+        let level = level.cast::<PyDict>().map_err(|_| damaged("a level is no dictionary"))?;
+        let records: Vec<f32> = array(level, "records")?;
+        let (records, rest) = records.as_chunks::<RECORD>();
+        let cubics: Vec<f32> = array(level, "cubics")?;
+        let (cubics, rest_of_cubics) = cubics.as_chunks::<64>();
+        if !rest.is_empty() || !rest_of_cubics.is_empty() {
+            return Err(damaged("a level has half a cell"));
+        }
+        let kinds: Vec<u8> = array(level, "kinds")?;
+        let sides: Vec<u8> = array(level, "sides")?;
+        let kind = |&kind: &u8| match kind {
+            0 => Ok(LevelKind::Branch),
+            1 => Ok(LevelKind::Linear),
+            2 => Ok(LevelKind::Cubic),
+            3 => Ok(LevelKind::Exact),
+            _ => Err(damaged("a level has cells of no known kind")),
+        };
+        let side = |&side: &u8| match side {
+            0 => Ok(ListSide::Asked),
+            1 => Ok(ListSide::Inside),
+            2 => Ok(ListSide::Outside),
+            _ => Err(damaged("a level has lists of no known side")),
+        };
+        let record = |&[a, b, c, d, e, f, g, h, lower, upper]: &[f32; RECORD]| Record { corners: [a, b, c, d, e, f, g, h], lower, upper };
+        all.levels.push(Level {
+            kinds: kinds.iter().map(kind).collect::<PyResult<_>>()?,
+            records: records.iter().map(record).collect(),
+            cubics: cubics.to_vec(),
+            lists: Lists {
+                ends: array(level, "ends")?,
+                sides: sides.iter().map(side).collect::<PyResult<_>>()?,
+                triangles: array(level, "triangles")?,
+            },
+        });
+    }
+    all.cut(all.levels.len().saturating_sub(1) as u32);
+    let surface = surface.map(|surface| Arc::clone(&surface.0));
+    let field = job(py, threads, progress, |run| AdaptiveField::from_levels(&all, surface, run))?;
+    Ok(PyAdaptiveField::of(field))
+}
+
+fn written(edit: &Edit) -> Vec<f64> {
+    let mut out = vec![if edit.change == Change::Grown { 1.0 } else { 0.0 }];
+    for corner in [edit.extent.min, edit.extent.max, edit.reach.min, edit.reach.max, edit.anchor.unwrap_or(DVec3::NAN)] {
+        out.extend(corner.to_array());
+    }
+    out
+}
+
+fn read(row: &[f64]) -> truefield::Result<Edit> {
+    let corner = |number: usize| DVec3::from_slice(&row[1 + 3 * number..]);
+    if row.len() != EDIT || !(row[0] == 0.0 || row[0] == 1.0) {
+        return Err(Error::Format("its edits are incomplete; the file is damaged, write it again".into()));
+    }
+    let change = if row[0] == 1.0 { Change::Grown } else { Change::Shrunk };
+    let anchor = Some(corner(4)).filter(|anchor| !anchor.is_nan());
+    Ok(Edit { change, extent: Aabb::new(corner(0), corner(1)), reach: Aabb::new(corner(2), corner(3)), anchor })
+}
+
+fn damaged(what: &str) -> PyErr {
+    raise(Error::Format(format!("{what}; the file is damaged, write it again")))
+}
+
+fn said<'py, T: for<'a> FromPyObject<'a, 'py>>(about: &Bound<'py, PyDict>, name: &str) -> PyResult<T> {
+    let value = about.get_item(name)?.ok_or_else(|| damaged(&format!("{name} is missing")))?;
+    value.extract().map_err(|_| damaged(&format!("{name} cannot be used")))
+}
+
+fn array<T: Element + Clone>(of: &Bound<'_, PyDict>, name: &str) -> PyResult<Vec<T>> {
+    let found: PyReadonlyArray1<'_, T> = of
+        .get_item(name)?
+        .and_then(|value| value.cast_into::<PyArray1<T>>().ok())
+        .map(|array| array.readonly())
+        .ok_or_else(|| damaged(&format!("{name} is no array of its kind")))?;
+    Ok(found.as_slice().map_err(|_| damaged(&format!("{name} is not contiguous")))?.to_vec())
+}
