@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Union
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 Method = Literal["linear", "cubic", "exact"]
 Rule = Literal["verified", "samples"]
 Crossing = Literal["linear", "cubic"]
-Tool = Union[Part, Shape]
 
 _DEEPEST = 24
 
@@ -186,7 +185,7 @@ class AdaptiveField:
 
     def carve(
         self,
-        tool: Tool,
+        tool: Part | Shape,
         path: ArrayLike | None = None,
         *,
         memory: int | None = None,
@@ -212,11 +211,11 @@ class AdaptiveField:
             TruefieldError: the path has no points, or the field or the tool cannot be used.
             MemoryError: the new cells would not fit.
         """
-        return self._edited("carve", tool, 0.0, path, memory, threads, progress)
+        return self._edited("carve", tool, 0.0, path=path, memory=memory, threads=threads, progress=progress)
 
     def fill(
         self,
-        tool: Tool,
+        tool: Part | Shape,
         path: ArrayLike | None = None,
         *,
         memory: int | None = None,
@@ -224,22 +223,22 @@ class AdaptiveField:
         progress: Progress | None = None,
     ) -> AdaptiveField:
         """The field with the tool added: min(field, tool); see `carve`."""
-        return self._edited("fill", tool, 0.0, path, memory, threads, progress)
+        return self._edited("fill", tool, 0.0, path=path, memory=memory, threads=threads, progress=progress)
 
     def intersect(
         self,
-        tool: Tool,
+        tool: Part | Shape,
         *,
         memory: int | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> AdaptiveField:
         """What is in both: max(field, tool). All of the domain is looked at; see `carve`."""
-        return self._edited("intersect", tool, 0.0, None, memory, threads, progress)
+        return self._edited("intersect", tool, 0.0, memory=memory, threads=threads, progress=progress)
 
     def blend(
         self,
-        tool: Tool,
+        tool: Part | Shape,
         radius: float,
         *,
         memory: int | None = None,
@@ -250,7 +249,9 @@ class AdaptiveField:
 
         min(field, tool) - h^2 / (4 radius), h = radius - |field - tool| where that is positive; see `carve`.
         """
-        return self._edited("blend", tool, arguments.length("radius", radius), None, memory, threads, progress)
+        return self._edited(
+            "blend", tool, arguments.length("radius", radius), memory=memory, threads=threads, progress=progress
+        )
 
     def level_of_detail(
         self,
@@ -295,9 +296,10 @@ class AdaptiveField:
     def _edited(
         self,
         operation: str,
-        tool: Tool,
+        tool: Part | Shape,
         radius: float,
-        path: ArrayLike | None,
+        *,
+        path: ArrayLike | None = None,
         memory: int | None,
         threads: int | None,
         progress: Progress | None,

@@ -12,14 +12,14 @@ known, with its `length` (null: infinite): "exact" within a band, "error" of eve
 `continuous`: whether the sign changes at the surface only. Its arrays are flat, x slowest: the numbers of `doubtful`
 samples, `values`, `lower` and `upper` (empty but for "bounds").
 
-An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4), `continuous`,
-`tolerance`, `growth` (null: infinite) and `max_depth` that edits go on to ask, the number of `levels`, `sign_rule` of
-the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles` of the mesh whose triangles
-exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has them; then, for each level n
-from the root down, `records_n`, ten numbers for each cell (the values at its corners, lower and upper error),
-`cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of exact leaves, and `kinds_n`
-of the cells: 0 with children, which are all in the next level, in order; 1 trilinear, 2 tricubic, 3 exact. The levels
-from the first to any are a field.
+An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4),
+`continuous`, `tolerance`, `growth` (null: infinite) and `max_depth` that edits go on to ask, the number of `levels`,
+`sign_rule` of the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles` of the
+mesh whose triangles exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has them;
+then, for each level n from the root down, `records_n`, ten numbers for each cell (the values at its corners, lower
+and upper error), `cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of exact
+leaves, and `kinds_n` of the cells: 0 with children, which are all in the next level, in order; 1 trilinear, 2
+tricubic, 3 exact. The levels from the first to any are a field.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from pathlib import Path
 from typing import Any, Final, get_args
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from truefield import _truefield, arguments, container
@@ -142,12 +141,12 @@ def load(
         def first(header: Header) -> int:
             if _kind(header) != "adaptive":
                 raise FileError(f"'{file}' is no adaptive field, so it has no levels; load it without depth")
-            return len(_ADAPTIVE) + len(_LEVEL) * min(deepest + 1, header["levels"])
+            return len(_ADAPTIVE) + len(_LEVEL) * min(deepest + 1, int(header["levels"]))
 
     header, arrays = container.read(file, _checked, progress, first)
     try:
         if _kind(header) == "adaptive":
-            return _adaptive(file, header, arrays, threads, progress)
+            return _adaptive(header, arrays, threads, progress)
         if _kind(header) == "sampled":
             return _sampled(header, arrays)
         return _complete(file, header, arrays, threads, progress)
@@ -205,9 +204,7 @@ def _adaptive_parts(
     return header, arrays
 
 
-def _adaptive(
-    file: Path, header: Header, arrays: Arrays, threads: int | None, progress: Progress | None
-) -> AdaptiveField:
+def _adaptive(header: Header, arrays: Arrays, threads: int | None, progress: Progress | None) -> AdaptiveField:
     surface = None
     if header["sign_rule"] is not None:
         mesh = TriangleMesh(arrays["vertices"], arrays["mesh_triangles"].astype(np.int64))
@@ -248,7 +245,9 @@ def _checked(header: Header) -> Mapping[str, Kept]:
     if kind not in ("adaptive", "complete", "sampled"):
         raise ValueError(f"kind is {kind!r:.80}")
     if kind == "adaptive":
-        expect(header, "extent", lambda box: isinstance(box, list) and len(box) == 2 and all(three(c, float) for c in box))
+        expect(
+            header, "extent", lambda box: isinstance(box, list) and len(box) == 2 and all(three(c, float) for c in box)
+        )
         expect(header, "children", lambda children: children in (4, 8))
         expect(header, "continuous", lambda continuous: isinstance(continuous, bool))
         expect(header, "tolerance", lambda tolerance: isinstance(tolerance, float))

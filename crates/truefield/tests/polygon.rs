@@ -93,7 +93,7 @@ fn polygons_make_quadtrees_that_can_be_edited() {
         let field = adaptive(&polygon, root(&polygon, Some(domain), Division::Quadtree).expect("a box"), &Rules::within(0.01), &run)
             .expect("a field");
         let (inner, plain) = (rectangle([0.1, -0.3], [0.9, 0.2]), Rules::within(0.01));
-        let tool = Polygon::new(&[inner.clone()], Fill::EvenOdd).expect("a polygon");
+        let tool = Polygon::new(std::slice::from_ref(&inner), Fill::EvenOdd).expect("a polygon");
         let carved = edit(&field, &tool, Operation::Carve, 1 << 30, &run).expect("a field");
         assert!(field.statistics().cells > 50 && carved.to_levels() != field.to_levels());
         for _ in 0..20_000 {

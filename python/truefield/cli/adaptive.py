@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Part, Sign, SignRule, Threads, Weld, ready
+from truefield.cli.options import FIELD_SUFFIX, Part, Sign, SignRule, Threads, Weld, load
 from truefield.cli.progress import progress
 
 
@@ -44,9 +44,12 @@ def adaptive(
     import truefield as tf
     from truefield import files
 
+    if output.suffix.lower() != FIELD_SUFFIX:
+        raise tf.TruefieldError(f"cannot write '{output}': a field goes into a {FIELD_SUFFIX}; change the suffix")
     files.check_file(output)
+    mesh = load(part, weld)
     with progress() as report:
-        surface = ready(part, weld, sign, threads, report)
+        surface = tf.Surface(mesh, sign=sign.value, threads=threads, progress=report)
         field = tf.adaptive_field(
             surface,
             tolerance,

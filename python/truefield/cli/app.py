@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from truefield.cli.adaptive import adaptive
 from truefield.cli.contour import contour
 from truefield.cli.distance import distance
 from truefield.cli.field import field
@@ -24,7 +25,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (info, thickness, contour, distance, field, sample, surface, render, transform):
+for command in (info, thickness, contour, distance, field, adaptive, sample, surface, render, transform):
     app.command()(command)
 
 

@@ -88,6 +88,11 @@ def ready(
         option = "--sign" if weld is None else "--weld"
         raise tf.TruefieldError(f"'{part}' is a field, built with its own mesh and sign rule; leave {option} out")
     field = tf.load(part, threads=threads, progress=report)
+    if isinstance(field, tf.AdaptiveField):
+        raise tf.TruefieldError(
+            f"'{part}' is an adaptive field, which truefield surface and truefield render take; "
+            "give a mesh or a complete field"
+        )
     if isinstance(field, tf.SampledField):
         raise tf.TruefieldError(f"'{part}' holds samples of distances only; give a mesh or a complete field")
     return field
