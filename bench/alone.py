@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench import paper, wavefronts
+from bench import adaptive, paper, wavefronts
 from bench.clock import Peak
 from bench.judge import Judge
 
@@ -168,10 +168,11 @@ def heavy(threads: int, repeats: int) -> Table:
 
 JOBS: dict[str, Callable[..., Table]] = {
     "contours": contours, "memory": memory, "engine": engine, "fields": fields, "shells": shells, "heavy": heavy,
-    "wavefront": wavefronts.wavefront,
+    "wavefront": wavefronts.wavefront, "adaptive": adaptive.parts, "sphere": adaptive.sphere, "trees": adaptive.trees,
+    "carving": adaptive.carving,
 }  # fmt: skip
 # These take each model; the others bring their own.
-WITH_MODEL = ("contours", "memory")
+WITH_MODEL = ("contours", "memory", "adaptive")
 
 
 def _median(repeats: int, work: Callable[..., Any], *arguments: Any, **options: Any) -> tuple[float, Any]:

@@ -111,3 +111,15 @@ def test_any_number_of_threads_makes_the_same_field(part: tf.TriangleMesh) -> No
         fields = [tf.adaptive_field(part, 0.01, method=method, threads=n) for n in (1, 2, 5)]
         first, *others = (np.stack(field.bounds(points)) for field in fields)
         assert all(np.array_equal(first, other) for other in others)
+
+
+def test_leaves_tile_the_domain_and_tell_their_errors() -> None:
+    field = tf.adaptive_field(csg.sphere(1.0), 0.01)
+    leaves = field.leaves()
+    low, high = field.extent
+    assert len(leaves.low) == field.statistics()["leaves"]
+    assert np.isclose(np.prod(leaves.high - leaves.low, axis=1).sum(), np.prod(high - low))
+    points = np.random.default_rng(3).uniform(leaves.low, leaves.high)
+    off = (np.linalg.norm(points, axis=1) - 1.0) - field.distance(points)
+    assert (leaves.lower - 1e-12 <= off).all()
+    assert (off <= leaves.upper + 1e-12).all()

@@ -49,6 +49,23 @@ class RayHits:
         return np.isfinite(self.distance)
 
 
+@dataclass(frozen=True, slots=True)
+class Leaves:
+    """The leaves of a tree, a row for each, children in the order x fastest.
+
+    Attributes:
+        low: (n, 3) float64 lowest corners.
+        high: (n, 3) float64 highest corners.
+        lower: (n,) float64; no distance in the leaf is less than what the leaf says by more than this (negative).
+        upper: (n,) float64; nor greater by more than this. For exact leaves: than their interpolated corners.
+    """
+
+    low: Floats
+    high: Floats
+    lower: Floats
+    upper: Floats
+
+
 class AdaptiveField:
     """Distances at the corners of the cells of an octree, with a proven error for each cell. Immutable.
 
@@ -72,6 +89,10 @@ class AdaptiveField:
         """The lower and upper corner, each (3,), of the domain."""
         low, high = self._native.extent
         return np.array(low), np.array(high)
+
+    def leaves(self) -> Leaves:
+        """Places and proven errors of all leaves."""
+        return Leaves(*self._native.leaves())
 
     def statistics(self) -> dict[str, int]:
         """Counts: cells, leaves, of these cubic and exact ones, entries of lists, depth, bytes."""

@@ -18,6 +18,9 @@ use crate::surface::{PySurface, interval_arrays, sign_name};
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 type MeshOf<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>, &'static str);
 
+type Points<'py> = Bound<'py, PyArray2<f64>>;
+type LeafArrays<'py> = (Points<'py>, Points<'py>, Floats<'py>, Floats<'py>);
+
 /// An adaptively sampled field; see `truefield.AdaptiveField`.
 #[pyclass(name = "AdaptiveField", module = "truefield._truefield", frozen)]
 pub struct PyAdaptiveField {
@@ -143,6 +146,21 @@ impl PyAdaptiveField {
     fn extent(&self) -> ([f64; 3], [f64; 3]) {
         let Aabb { min, max } = self.field.extent_box();
         (min.to_array(), max.to_array())
+    }
+
+    /// `(low, high, lower, upper)` of all leaves: their corners and the bounds of their error.
+    fn leaves<'py>(&self, py: Python<'py>) -> PyResult<LeafArrays<'py>> {
+        let mut leaves = Vec::new();
+        py.detach(|| {
+            self.field.walk(&mut |cell| {
+                if cell.is_leaf() {
+                    leaves.push((cell.extent(), cell.error()));
+                }
+                true
+            });
+        });
+        let (low, high) = (rows(py, leaves.iter().map(|leaf| leaf.0.min))?, rows(py, leaves.iter().map(|leaf| leaf.0.max))?);
+        Ok((low, high, column(py, leaves.iter().map(|leaf| leaf.1.lower)), column(py, leaves.iter().map(|leaf| leaf.1.upper))))
     }
 
     fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
