@@ -231,13 +231,20 @@ impl<'a> Cell<'a> {
 
     /// The nearest triangle of an exact leaf, in the surface's units.
     fn nearest(&self, p: DVec3) -> Candidate {
-        let mut best = Candidate::within(f64::INFINITY);
-        let (Some(surface), Leaf::Exact(list)) = (&self.field.surface, self.leaf()) else { return best };
-        let p = p * surface.scale();
-        for &triangle in list {
-            best.offer(surface.tree().facet(triangle).distance_squared(p), triangle);
+        let (Some(surface), Leaf::Exact(list)) = (&self.field.surface, self.leaf()) else { return Candidate::within(f64::INFINITY) };
+        let (tree, at) = (surface.tree(), p * surface.scale());
+        if list.is_empty() {
+            // The corners tell how far to look.
+            let known = self.error().plus(Interval::exact(self.record().value(self.local(p)))).widen(self.field.rounding(p));
+            let within = known.upper.max(-known.lower) * surface.scale() * (1.0 + 1e-9);
+            let found = tree.nearest(at, Candidate::within(within));
+            return if found.found() { found } else { tree.nearest(at, Candidate::within(f64::INFINITY)) };
         }
-        if list.is_empty() { surface.tree().nearest(p, best) } else { best }
+        let mut best = Candidate::within(f64::INFINITY);
+        for &triangle in list {
+            best.offer(tree.facet(triangle).distance_squared(at), triangle);
+        }
+        best
     }
 }
 
