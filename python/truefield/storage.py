@@ -13,8 +13,8 @@ known, with its `length` (null: infinite): "exact" within a band, "error" of eve
 samples, `values`, `lower` and `upper` (empty but for "bounds").
 
 An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4),
-`continuous`, `tolerance`, `growth` (null: infinite) and `max_depth` that edits go on to ask, the number of `levels`,
-`sign_rule` of the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles` of the
+`continuous`, `tolerance`, `growth` (null: infinite), `max_depth` and `rule` that edits go on to ask, the number of
+`levels`, `sign_rule` of the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles` of the
 mesh whose triangles exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has them;
 then, for each level n from the root down, `records_n`, ten numbers for each cell (the values at its corners, lower
 and upper error), `cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of exact
@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truefield import _truefield, arguments, container
-from truefield.adaptive import AdaptiveField
+from truefield.adaptive import AdaptiveField, Rule
 from truefield.arguments import Progress
 from truefield.container import Arrays, Header, Kept, expect, three
 from truefield.errors import FileError, TruefieldError
@@ -209,7 +209,7 @@ def _adaptive(header: Header, arrays: Arrays, threads: int | None, progress: Pro
     if header["sign_rule"] is not None:
         mesh = TriangleMesh(arrays["vertices"], arrays["mesh_triangles"].astype(np.int64))
         surface = Surface(mesh, header["sign_rule"], threads=threads, progress=progress)._native
-    names = ("extent", "children", "continuous", "tolerance", "max_depth")
+    names = ("extent", "children", "continuous", "tolerance", "max_depth", "rule")
     growth = np.inf if header["growth"] is None else header["growth"]
     about = {name: header[name] for name in names} | {"growth": growth, "edits": arrays["edits"]}
     read = sum(name.startswith("records_") for name in arrays)
@@ -253,6 +253,7 @@ def _checked(header: Header) -> Mapping[str, Kept]:
         expect(header, "tolerance", lambda tolerance: isinstance(tolerance, float))
         expect(header, "growth", lambda growth: growth is None or isinstance(growth, float))
         expect(header, "max_depth", lambda depth: type(depth) is int and 0 <= depth < _MOST_LEVELS)
+        expect(header, "rule", lambda rule: rule in get_args(Rule))
         expect(header, "levels", lambda levels: type(levels) is int and 0 < levels <= _MOST_LEVELS)
         expect(header, "sign_rule", lambda rule: rule is None or rule in get_args(Sign))
         expect(header, "sums", lambda sums: isinstance(sums, dict))

@@ -62,11 +62,20 @@ fn unknown_method(name: &str) -> PyErr {
     raise(Error::invalid(format!("method is {name:?}; choose \"linear\", \"cubic\" or \"exact\"")))
 }
 
-fn rule(name: &str) -> PyResult<Rule> {
+/// The rule that a name stands for.
+pub fn rule(name: &str) -> PyResult<Rule> {
     match name {
         "verified" => Ok(Rule::Verified),
         "samples" => Ok(Rule::Samples),
         _ => Err(raise(Error::invalid(format!("rule is {name:?}; choose \"verified\" or \"samples\"")))),
+    }
+}
+
+/// What a rule is called.
+pub fn rule_name(rule: Rule) -> &'static str {
+    match rule {
+        Rule::Verified => "verified",
+        Rule::Samples => "samples",
     }
 }
 

@@ -128,6 +128,7 @@ pub fn levels_of<'py>(
     about.set_item("tolerance", levels.accuracy.tolerance)?;
     about.set_item("growth", levels.accuracy.growth)?;
     about.set_item("max_depth", levels.accuracy.max_depth)?;
+    about.set_item("rule", crate::adaptive::rule_name(levels.accuracy.rule))?;
     let edits: Vec<f64> = levels.edits.list().iter().flat_map(written).collect();
     about.set_item("edits", edits.into_pyarray(py))?;
     let out = PyList::empty(py);
@@ -160,7 +161,12 @@ pub fn field_of_levels(
     let root =
         Root { extent: Aabb::new(min.into(), max.into()), division: Division::with_children(said(about, "children")?).map_err(raise)? };
     let continuity = if said(about, "continuous")? { Continuity::Everywhere } else { Continuity::ExceptOpenings };
-    let accuracy = Accuracy { tolerance: said(about, "tolerance")?, growth: said(about, "growth")?, max_depth: said(about, "max_depth")? };
+    let accuracy = Accuracy {
+        tolerance: said(about, "tolerance")?,
+        growth: said(about, "growth")?,
+        max_depth: said(about, "max_depth")?,
+        rule: crate::adaptive::rule(&said::<String>(about, "rule")?)?,
+    };
     let mut all = Levels::new(root, continuity, accuracy);
     let edits: Vec<f64> = array(about, "edits")?;
     all.edits = Edits::new(edits.chunks(EDIT).map(read).collect::<truefield::Result<_>>().map_err(raise)?);

@@ -92,7 +92,7 @@ pub fn random_tree(
     mut value: impl FnMut([u32; 3]) -> f32,
 ) -> AdaptiveField {
     let root = Root { extent, division };
-    let accuracy = Accuracy { tolerance: 1.0, growth: f64::INFINITY, max_depth: depth };
+    let accuracy = Accuracy { tolerance: 1.0, growth: f64::INFINITY, max_depth: depth, rule: Rule::Verified };
     let mut levels = Levels::new(root, Continuity::Everywhere, accuracy);
     let mut cells = vec![[0u32; 3]];
     for at in 0..=depth {

@@ -16,6 +16,7 @@ use crate::field::adaptive::{Accuracy, AdaptiveField, Division, Level, LevelKind
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
+pub use crate::field::adaptive::Rule;
 pub use coalesce::coalesce;
 pub use mesh::{Leaves, adaptive_mesh};
 use verify::{Block, Found};
@@ -28,16 +29,6 @@ const DRAFT: u64 = 160;
 
 /// How much wider than the shape the domain is, where none is asked for.
 const MARGIN: f64 = 0.125;
-
-/// When a cell says enough.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rule {
-    /// When its error is proven to be small enough.
-    Verified,
-    /// When the paper's 19 samples, its centre and those of its edges and faces, are near enough. Quicker and
-    /// coarser; bounds stay proven, and may be wider than what was asked for.
-    Samples,
-}
 
 /// How leaves interpolate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,7 +72,7 @@ impl Rules {
 
     /// What edits will go on to ask.
     pub(crate) fn accuracy(&self) -> Accuracy {
-        Accuracy { tolerance: self.tolerance, growth: self.growth, max_depth: self.max_depth }
+        Accuracy { tolerance: self.tolerance, growth: self.growth, max_depth: self.max_depth, rule: self.rule }
     }
 
     /// Refuses what cannot be asked for.

@@ -3,6 +3,16 @@
 use super::MAX_DEPTH;
 use crate::error::{Error, Result};
 
+/// When a cell says enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rule {
+    /// When its error is proven to be small enough.
+    Verified,
+    /// When the paper's 19 samples, its centre and those of its edges and faces, are near enough. Quicker and
+    /// coarser; bounds stay proven, and may be wider than what was asked for.
+    Samples,
+}
+
 /// What was asked of a tree, and what edits of it go on to ask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Accuracy {
@@ -12,6 +22,8 @@ pub struct Accuracy {
     pub growth: f64,
     /// No cell is divided at this depth, whatever its error.
     pub max_depth: u32,
+    /// When a cell says enough.
+    pub rule: Rule,
 }
 
 impl Accuracy {

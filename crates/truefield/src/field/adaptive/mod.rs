@@ -15,7 +15,7 @@ mod page;
 
 use std::sync::Arc;
 
-pub use accuracy::Accuracy;
+pub use accuracy::{Accuracy, Rule};
 pub(crate) use assemble::{Patch, Patched};
 pub(crate) use cell::aged_error;
 pub use cell::{Cell, Leaf, Root};

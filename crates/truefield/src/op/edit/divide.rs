@@ -5,7 +5,7 @@ use crate::build::adaptive::Reconstruction;
 use crate::build::adaptive::verify::Block;
 use crate::distance::Source;
 use crate::error::{Error, Result};
-use crate::field::adaptive::{AdaptiveField, Cell, Edit, Leaf, ListSide, MAX_DEPTH, Record, Samples, cubic_third, cubic_value};
+use crate::field::adaptive::{AdaptiveField, Cell, Edit, Leaf, ListSide, MAX_DEPTH, Record, Rule, Samples, cubic_third, cubic_value};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
@@ -291,7 +291,11 @@ impl<'a> Divider<'a> {
         let found = block.verify(extent, &samples, bend, self.tool.noise() + 0.5 * (steep - 1.0).max(0.0) * steps * (1.0 + 1e-12));
         let accuracy = self.field.accuracy();
         let own = found.linear;
-        if own.upper.max(-own.lower) > accuracy.allowed(found.least) && piece.depth < accuracy.max_depth.min(MAX_DEPTH) {
+        let off = match accuracy.rule {
+            Rule::Verified => own.upper.max(-own.lower),
+            Rule::Samples => found.linear_samples,
+        };
+        if off > accuracy.allowed(found.least) && piece.depth < accuracy.max_depth.min(MAX_DEPTH) {
             return Outcome::Divide;
         }
         // Corners are shared with neighbours: beyond the reach they are those of the old tree.
