@@ -45,7 +45,7 @@ def test_operations_are_minimum_and_maximum(field: tf.AdaptiveField, points: tf.
         assert np.all(lower[~outside] <= expected[~outside] + 1e-9)
 
 
-def test_a_path_is_one_stroke_after_the_other(field: tf.AdaptiveField) -> None:
+def test_a_tool_is_swept_along_its_path(field: tf.AdaptiveField) -> None:
     path = [[-0.2, 0.0, 1.0], [0.1, 0.0, 1.0], [0.1, 0.05, 1.0]]
     cut = field.carve(csg.sphere(0.3), path=path)
     start, end = np.array(path[0]), np.array(path[1])

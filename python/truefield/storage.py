@@ -14,11 +14,11 @@ samples, `values`, `lower` and `upper` (empty but for "bounds").
 
 An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4),
 `continuous`, `tolerance`, `growth` (null: infinite), `max_depth` and `rule` that edits go on to ask, the number of
-`levels`, `sign_rule` of the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles` of the
-mesh whose triangles exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has them;
-then, for each level n from the root down, `records_n`, ten numbers for each cell (the values at its corners, lower
-and upper error), `cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of exact
-leaves, and `kinds_n` of the cells: 0 with children, which are all in the next level, in order; 1 trilinear, 2
+`levels`, `sign_rule` of the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles`
+of the mesh whose triangles exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has
+them; then, for each level n from the root down, `records_n`, ten numbers for each cell (the values at its corners,
+lower and upper error), `cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of
+exact leaves, and `kinds_n` of the cells: 0 with children, which are all in the next level, in order; 1 trilinear, 2
 tricubic, 3 exact. The levels from the first to any are a field.
 """
 

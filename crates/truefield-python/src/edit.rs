@@ -2,20 +2,19 @@
 
 use std::sync::Arc;
 
-use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use truefield::build::adaptive::{Rules, coalesce};
 use truefield::field::adaptive::{
     Accuracy, AdaptiveField, Change, Division, Edit, Edits, Level, LevelKind, Levels, ListSide, Lists, Record, Root,
 };
-use truefield::op::edit::{Operation, edit, edit_along};
+use truefield::op::edit::{Operation, edit};
 use truefield::op::level_of_detail::{Detail, level_of_detail};
 use truefield::source::polygon::{Fill, Polygon};
 use truefield::{Aabb, Continuity, DVec3, Error};
 
 use crate::adaptive::PyAdaptiveField;
-use crate::convert::points;
 use crate::door::{job, raise};
 use crate::sampled::PySampledField;
 use crate::shape::PyShape;
@@ -27,16 +26,15 @@ const RECORD: usize = 10;
 /// Numbers of an edit in a file: 0 where the shape shrank or 1 where it grew, two boxes and an anchor.
 const EDIT: usize = 16;
 
-/// The field edited with a tool, or with the tool at every place of a path.
+/// The field edited with a tool.
 #[pyfunction]
-#[pyo3(signature = (field, tool, operation, radius, path, memory, threads=None, progress=None))]
+#[pyo3(signature = (field, tool, operation, radius, memory, threads=None, progress=None))]
 pub fn edit_field(
     py: Python<'_>,
     field: &PyAdaptiveField,
     tool: &PyShape,
     operation: &str,
     radius: f64,
-    path: Option<PyReadonlyArray2<'_, f64>>,
     memory: u64,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -52,12 +50,8 @@ pub fn edit_field(
             ))));
         }
     };
-    let path = path.map(|path| points(&path)).transpose()?;
     let (field, tool) = (&field.field, Arc::clone(&tool.0));
-    let edited = job(py, threads, progress, |run| match &path {
-        Some(path) => edit_along(field, &*tool, operation, path, memory, run),
-        None => edit(field, &*tool, operation, memory, run),
-    })?;
+    let edited = job(py, threads, progress, |run| edit(field, &*tool, operation, memory, run))?;
     Ok(PyAdaptiveField::of(edited))
 }
 

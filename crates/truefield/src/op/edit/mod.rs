@@ -6,11 +6,9 @@
 
 mod divide;
 mod operation;
-mod path;
 mod settle;
 
 pub use operation::Operation;
-pub use path::edit_along;
 
 use crate::distance::{Distance, Source};
 use crate::error::{Error, Result};
