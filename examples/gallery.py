@@ -22,7 +22,7 @@ CLAY = (206, 172, 140)
 
 def slab() -> Image.Image:
     """A slab carved with a ball-ended chisel along rose curves."""
-    field = tf.adaptive_field(csg.rounded_box((4, 4, 0.8), 0.1), 2e-3, growth=0.2)
+    field = tf.adaptive_field(csg.rounded_box((4, 4, 0.8), 0.1), 4e-3, growth=0.2, rule="samples")
     turn = np.linspace(0, 2 * np.pi, 1201)
     for petals, radius in ((2.0, 1.7), (4.0, 1.1)):
         reach = radius * np.cos(petals * turn)
@@ -37,7 +37,7 @@ def vase() -> Image.Image:
     """A vase of revolution, hollow, with waves carved around it."""
     outside = csg.ellipsoid((1.0, 1.0, 1.4)).blend(csg.cylinder(0.45, 3.6), 0.35)
     solid = (outside & csg.box((4, 4, 3.2))) - outside.offset(-0.1).translate((0, 0, 0.12))
-    field = tf.adaptive_field(solid, 4e-3, growth=0.2)
+    field = tf.adaptive_field(solid, 6e-3, growth=0.2, rule="samples")
     turn = np.linspace(0, 2 * np.pi, 361)
     for height in np.linspace(-0.8, 0.8, 9):
         z = height + 0.06 * np.sin(8 * turn)
@@ -49,7 +49,7 @@ def vase() -> Image.Image:
 
 def sponge() -> Image.Image:
     """A Menger sponge of four levels."""
-    return tf.adaptive_field(csg.menger_sponge(4), 4e-3, growth=np.inf).render(size=SIZE, samples=9)
+    return tf.adaptive_field(csg.menger_sponge(4), 4e-3, growth=np.inf, rule="samples").render(size=SIZE, samples=9)
 
 
 def molecule() -> Image.Image:
@@ -57,7 +57,7 @@ def molecule() -> Image.Image:
     turn = np.arange(6) * np.pi / 3
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(6)], axis=1)
     centers = np.concatenate([1.3 * ring, 2.2 * ring * [1, 1, 0] + [0, 0, 0.2]])
-    field = tf.adaptive_field(csg.molecule(centers, np.repeat([0.55, 0.38], 6)), 1e-2, growth=0.1)
+    field = tf.adaptive_field(csg.molecule(centers, np.repeat([0.55, 0.38], 6)), 1e-2, growth=0.1, rule="samples")
     image = field.render(size=SIZE, colour=(186, 96, 92), samples=9)
     for distance, part in ((0.15, 0.22), (0.3, 0.12)):
         aura = field.render(size=SIZE, distance=distance, colour=(120, 170, 220), samples=1)
@@ -67,7 +67,9 @@ def molecule() -> Image.Image:
 
 def teapot() -> Image.Image:
     """A teapot of bicubic Bezier patches."""
-    return tf.adaptive_field(patches.teapot(), 1e-2, growth=np.inf).render(size=SIZE, colour=(214, 206, 188), samples=9)
+    return tf.adaptive_field(patches.teapot(), 1e-2, growth=np.inf, rule="samples").render(
+        size=SIZE, colour=(214, 206, 188), samples=9
+    )
 
 
 def letter() -> Image.Image:

@@ -224,11 +224,12 @@ class AdaptiveField:
             threads: worker threads; the field never depends on them.
             progress: called as `progress(phase, fraction)`.
 
-        Only cells that meet the tool's box, grown by half its longest side, are looked at; all others, and what memory
-        they are in, are shared by both fields. New cells keep to the field's tolerance and growth beside the old
-        values, and are divided by its rule: on a field made with rule="samples" a stroke is a matter of milliseconds, on
-        a verified one it takes some ten times as many cells. `bounds` hold the distance of the carved solid
-        everywhere, also far away, where its nearest point may be gone; what is only bounded by a point inside says so. To undo, keep the old field.
+        Only cells that meet the tool's box, grown by half its longest side, are looked at; all others, and what
+        memory they are in, are shared by both fields. New cells keep to the field's tolerance and growth beside the
+        old values, and are divided by its rule: on a field made with rule="samples" a stroke is a matter of
+        milliseconds, on a verified one it takes some ten times as many cells. `bounds` hold the distance of the
+        carved solid everywhere, also far away, where its nearest point may be gone; what is only bounded by a point
+        inside says so. To undo, keep the old field.
 
         Raises:
             TruefieldError: the path has no points, or the field or the tool cannot be used.
