@@ -108,6 +108,12 @@ pub fn root(source: &dyn Source, domain: Option<Aabb>, division: Division) -> Re
         (None, None) => return Err(Error::invalid("the shape has no end; give a domain, the box that the field is to cover")),
     };
     let axes = division.axes();
+    let mut asked = asked;
+    if division == Division::Quadtree && !(asked.min.z.is_finite() && asked.max.z.is_finite()) {
+        // Any stretch of z will do.
+        let half = 0.5 * asked.size().truncate().max_element();
+        (asked.min.z, asked.max.z) = (-half, half);
+    }
     let size = (0..axes).map(|axis| asked.size()[axis]).fold(0.0, f64::max);
     if !(asked.min.is_finite() && asked.max.is_finite() && asked.min.cmple(asked.max).all() && size > 0.0) {
         return Err(Error::invalid(format!(
