@@ -79,7 +79,7 @@ def carving(threads: int, repeats: int) -> Table:
     from truefield import csg
 
     del repeats
-    field = tf.adaptive_field(csg.rounded_box((4, 4, 1), 0.2), 3e-4, growth=0.0, max_depth=9, threads=threads)
+    field = tf.adaptive_field(csg.rounded_box((4, 4, 1), 0.2), 1e-4, growth=0.0, rule="samples", threads=threads)
     before = field.statistics()
     random = np.random.default_rng(1)
     spent = []
