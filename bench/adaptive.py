@@ -79,16 +79,18 @@ def carving(threads: int, repeats: int) -> Table:
     from truefield import csg
 
     del repeats
-    field = tf.adaptive_field(csg.rounded_box((4, 4, 1), 0.2), 1e-4, growth=0.0, rule="samples", threads=threads)
+    field = tf.adaptive_field(csg.sphere(1.0), 4e-5, growth=np.inf, max_depth=9, rule="samples", threads=threads)
     before = field.statistics()
     random = np.random.default_rng(1)
     spent = []
     for _ in range(200):
-        x, y, turn = random.uniform(-1.8, 1.8), random.uniform(-1.8, 1.8), random.uniform(0, 2 * np.pi)
-        path = np.array([[x, y, 0.5], [x + 0.1 * np.cos(turn), y + 0.1 * np.sin(turn), 0.5]])
-        start = time.perf_counter()
+        start, way = random.normal(size=(2, 3))
+        start /= np.linalg.norm(start)
+        end = start + 0.1 * way / np.linalg.norm(way)
+        path = np.array([start, end / np.linalg.norm(end)])
+        begin = time.perf_counter()
         field = field.carve(csg.sphere(0.04), path=path, threads=threads)
-        spent.append(time.perf_counter() - start)
+        spent.append(time.perf_counter() - begin)
     after = field.statistics()
     each = np.array(spent) * 1e3
     rows = [[
@@ -96,7 +98,11 @@ def carving(threads: int, repeats: int) -> Table:
         f"{each[-20:].mean():.1f}",
     ]]  # fmt: skip
     head = ["leaves before", "after 200 strokes", "median ms", "95 % ms", "last 20, mean ms"]
-    return {"title": "carving: strokes 0.1 long with a ball of 0.04 on a slab of 4 x 4 x 1", "head": head, "rows": rows}
+    return {
+        "title": "carving: strokes 0.1 long with a ball of 0.04 on the unit sphere, tolerance 5e-5",
+        "head": head,
+        "rows": rows,
+    }
 
 
 def parts(threads: int, repeats: int, vertices: NDArray[np.float64], triangles: NDArray[np.int64]) -> Table:

@@ -24,12 +24,12 @@ def slab() -> Image.Image:
     """A slab carved with a ball-ended chisel along rose curves."""
     field = tf.adaptive_field(csg.rounded_box((4, 4, 0.8), 0.1), 4e-3, growth=0.2, rule="samples")
     turn = np.linspace(0, 2 * np.pi, 1201)
-    for petals, radius in ((2.0, 1.7), (4.0, 1.1)):
+    for petals, radius in ((2.0, 1.75), (4.0, 1.3)):
         reach = radius * np.cos(petals * turn)
         depth = 0.42 + 0.05 * np.cos(6 * turn)
         path = np.stack([reach * np.cos(turn), reach * np.sin(turn), depth], axis=1)
         for start in range(0, len(path) - 1, 12):
-            field = field.carve(csg.sphere(0.09), path=path[start : start + 13])
+            field = field.carve(csg.sphere(0.11), path=path[start : start + 13])
     return field.render(size=SIZE, colour=CLAY, samples=9)
 
 
@@ -48,8 +48,8 @@ def vase() -> Image.Image:
 
 
 def sponge() -> Image.Image:
-    """A Menger sponge of four levels."""
-    return tf.adaptive_field(csg.menger_sponge(4), 4e-3, growth=np.inf, rule="samples").render(size=SIZE, samples=9)
+    """A Menger sponge of three levels."""
+    return tf.adaptive_field(csg.menger_sponge(3), 2e-3, growth=np.inf, rule="samples").render(size=SIZE, samples=9)
 
 
 def molecule() -> Image.Image:
@@ -57,7 +57,7 @@ def molecule() -> Image.Image:
     turn = np.arange(6) * np.pi / 3
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(6)], axis=1)
     centers = np.concatenate([1.3 * ring, 2.2 * ring * [1, 1, 0] + [0, 0, 0.2]])
-    field = tf.adaptive_field(csg.molecule(centers, np.repeat([0.55, 0.38], 6)), 1e-2, growth=0.1, rule="samples")
+    field = tf.adaptive_field(csg.molecule(centers, np.repeat([0.55, 0.38], 6)), 1e-3, growth=0.1, rule="samples")
     image = field.render(size=SIZE, colour=(186, 96, 92), samples=9)
     for distance, part in ((0.15, 0.22), (0.3, 0.12)):
         aura = field.render(size=SIZE, distance=distance, colour=(120, 170, 220), samples=1)
