@@ -162,6 +162,8 @@ def test_damage_is_found_anywhere(tmp_path: Path) -> None:
 
 def test_polygons_are_flat_shapes() -> None:
     letter = polygons.letter_r(2.0)
+    low, high = tf.adaptive_field(letter, 0.05).extent
+    assert np.isfinite([low, high]).all()
     inside = letter.distance([[0.16, 1.0, 0.0], [0.7, 1.42, 5.0], [1.0, 0.3, -2.0], [0.1, 0.1, 9.0]])
     assert np.array_equal(inside < 0, [True, False, True, True])
     field = tf.adaptive_field(letter, 0.005, domain=((-0.5, -0.5, 0), (2.0, 2.5, 1)))

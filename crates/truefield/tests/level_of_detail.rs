@@ -18,7 +18,7 @@ fn edited(reconstruction: Reconstruction) -> (AdaptiveField, Solid) {
         (Step::Intersect, Ball::new(0.0, 0.0, 0.2, 1.1)),
     ];
     let run = Run::default();
-    let rules = Rules { reconstruction, ..Rules::within(0.005) };
+    let rules = Rules { reconstruction, ..Rules::within(0.02) };
     let mut field = adaptive(&first, root(&first, None, Division::Octree).expect("a box"), &rules, &run).expect("a field");
     for (step, ball) in &steps {
         let operation = match step {
@@ -37,7 +37,7 @@ fn coarser_fields_are_honest_and_monotone() {
     for reconstruction in [Reconstruction::Linear, Reconstruction::Cubic] {
         let (fine, solid) = edited(reconstruction);
         let depth = fine.statistics().depth;
-        let tolerances = [0.005, 0.01, 0.03, 0.1, 0.5, 10.0].map(Detail::Tolerance);
+        let tolerances = [0.02, 0.025, 0.03, 0.1, 0.5, 10.0].map(Detail::Tolerance);
         let depths = (0..=depth).rev().map(Detail::Depth);
         for details in [tolerances.to_vec(), depths.collect()] {
             let mut before = fine.clone();

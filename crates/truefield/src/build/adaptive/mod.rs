@@ -102,19 +102,18 @@ impl Rules {
 /// The root cell for a shape: a cube around the domain, or around the shape's extent with room on all sides. A quadtree's
 /// is a square column.
 pub fn root(source: &dyn Source, domain: Option<Aabb>, division: Division) -> Result<Root> {
-    let asked = match (domain, source.extent()) {
+    let axes = division.axes();
+    let longest = |extent: &Aabb| (0..axes).map(|axis| extent.size()[axis]).fold(0.0, f64::max);
+    let mut asked = match (domain, source.extent()) {
         (Some(domain), _) => domain,
-        (None, Some(extent)) => extent.grow(MARGIN * extent.size().max_element()),
+        (None, Some(extent)) => extent.grow(MARGIN * longest(&extent)),
         (None, None) => return Err(Error::invalid("the shape has no end; give a domain, the box that the field is to cover")),
     };
-    let axes = division.axes();
-    let mut asked = asked;
+    let size = longest(&asked);
     if division == Division::Quadtree && !(asked.min.z.is_finite() && asked.max.z.is_finite()) {
         // Any stretch of z will do.
-        let half = 0.5 * asked.size().truncate().max_element();
-        (asked.min.z, asked.max.z) = (-half, half);
+        (asked.min.z, asked.max.z) = (-0.5 * size, 0.5 * size);
     }
-    let size = (0..axes).map(|axis| asked.size()[axis]).fold(0.0, f64::max);
     if !(asked.min.is_finite() && asked.max.is_finite() && asked.min.cmple(asked.max).all() && size > 0.0) {
         return Err(Error::invalid(format!(
             "the domain from {} to {} is no box; give its lowest corner, then its highest",
