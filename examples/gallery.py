@@ -1,6 +1,6 @@
 """The pictures of Frisken et al. 2000, of our own shapes: `python examples/gallery.py docs/adaptive.png`.
 
-Carved slab, vase with a chiselled relief, Menger sponge, molecule with its aura, teapot of Bezier patches, the letter R
+Carved slab, vase with a chiselled relief, Menger sponge, molecule and its offset, teapot of Bezier patches, the letter R
 as a quadtree, and one field at four levels of detail. Takes some minutes.
 """
 
@@ -53,21 +53,21 @@ def sponge() -> Image.Image:
 
 
 def molecule() -> Image.Image:
-    """A ring of atoms with branches, and the aura around it: offsets, nearer ones denser."""
+    """A ring of atoms with branches, and the surface a quarter of a unit outside it."""
     turn = np.arange(6) * np.pi / 3
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(6)], axis=1)
     centers = np.concatenate([1.3 * ring, 2.2 * ring * [1, 1, 0] + [0, 0, 0.2]])
     field = tf.adaptive_field(csg.molecule(centers, np.repeat([0.55, 0.38], 6)), 1e-3, growth=0.1, rule="samples")
-    image = field.render(size=SIZE, colour=(186, 96, 92), samples=9)
-    for distance, part in ((0.15, 0.22), (0.3, 0.12)):
-        aura = field.render(size=SIZE, distance=distance, colour=(120, 170, 220), samples=1)
-        image = Image.blend(image, aura, part)
-    return image
+    page = Image.new("RGB", SIZE, "white")
+    half = (SIZE[0] // 2, SIZE[1])
+    page.paste(field.render(size=half, colour=(186, 96, 92), samples=9), (0, 0))
+    page.paste(field.render(size=half, distance=0.25, colour=(140, 170, 205), samples=9), (half[0], 0))
+    return page
 
 
 def teapot() -> Image.Image:
     """A teapot of bicubic Bezier patches."""
-    return tf.adaptive_field(patches.teapot(), 1e-2, growth=np.inf, rule="samples").render(
+    return tf.adaptive_field(patches.teapot(), 2e-2, growth=np.inf, rule="samples").render(
         size=SIZE, colour=(214, 206, 188), samples=9
     )
 
@@ -118,7 +118,7 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "carved slab": slab,
     "carved vase": vase,
     "Menger sponge": sponge,
-    "molecule and its aura": molecule,
+    "molecule, and grown by 0.25": molecule,
     "teapot of patches": teapot,
     "letter R, quadtree": letter,
     "levels of detail": levels,
