@@ -1,7 +1,7 @@
 """The pictures of Frisken et al. 2000, of our own shapes: `python examples/gallery.py docs/adaptive.png`.
 
-Carved slab, vase with a chiselled relief, Menger sponge, molecule and its offset, teapot of Bezier patches, the letter R
-as a quadtree, and one field at four levels of detail. Takes some minutes.
+Carved slab, vase with a chiselled relief, Menger sponge, molecule and its offset, teapot of Bezier patches, letter R as a
+quadtree, and one field at four levels of detail. Takes some minutes.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def molecule() -> Image.Image:
 
 def teapot() -> Image.Image:
     """A teapot of bicubic Bezier patches."""
-    return tf.adaptive_field(patches.teapot(), 2e-2, growth=np.inf, rule="samples").render(
+    return tf.adaptive_field(patches.teapot(), 5e-3, growth=np.inf, rule="samples").render(
         size=SIZE, colour=(214, 206, 188), samples=9
     )
 
