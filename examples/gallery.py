@@ -1,7 +1,7 @@
 """The pictures of Frisken et al. 2000, of our own shapes: `python examples/gallery.py docs/adaptive.png`.
 
-Carved slab, vase with a chiselled relief, Menger sponge, molecule and its offset, teapot of Bezier patches, letter R as a
-quadtree, and one field at four levels of detail. Takes some minutes.
+Carved slab, vase with a chiselled relief, Menger sponge, molecule and its offset, teapot of Bezier patches, letter R
+as a quadtree, and one field at four levels of detail. Takes some minutes.
 """
 
 from __future__ import annotations
