@@ -17,6 +17,7 @@ from PIL import Image, ImageDraw
 from truefield import csg, lettering, patches, polygons
 
 SIZE = (800, 640)
+COLUMNS = 4
 CLAY = (206, 172, 140)
 
 
@@ -103,14 +104,14 @@ def levels() -> Image.Image:
     """One field at four levels of detail, by the error each cell holds."""
     shape = csg.rounded_box((2, 2, 2), 0.2) - csg.sphere(1.25) | csg.torus(0.6, 0.18)
     field = tf.adaptive_field(shape, 2e-3, growth=0.2)
-    page = Image.new("RGB", SIZE, "white")
-    half = (SIZE[0] // 2, SIZE[1] // 2)
+    page = Image.new("RGB", (2 * SIZE[0], SIZE[1]), "white")
+    half = (SIZE[0] // 2, SIZE[1])
     for place, tolerance in enumerate((0.2, 0.08, 0.02, 0.002)):
         coarse = field.level_of_detail(tolerance=tolerance)
         tile = coarse.render(size=half, samples=9)
         says = f"error {tolerance:g}, {coarse.statistics()['leaves']} leaves"
         ImageDraw.Draw(tile).text((12, 8), says, fill=(60, 66, 74), font=lettering.font(15))
-        page.paste(tile, ((place % 2) * half[0], place // 2 * half[1]))
+        page.paste(tile, (place * half[0], 0))
     return page
 
 
@@ -118,9 +119,9 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
     "carved slab": slab,
     "carved vase": vase,
     "Menger sponge": sponge,
+    "letter R, quadtree": letter,
     "molecule, and grown by 0.25": molecule,
     "teapot of patches": teapot,
-    "letter R, quadtree": letter,
     "levels of detail": levels,
 }
 
@@ -128,15 +129,23 @@ PICTURES: dict[str, Callable[[], Image.Image]] = {
 def main(path: Path, only: list[str]) -> None:
     """Draws all pictures, or those named, on one page."""
     chosen = {name: draw for name, draw in PICTURES.items() if not only or any(word in name for word in only)}
-    columns = 3 if len(chosen) > 2 else len(chosen)
-    rows = -(-len(chosen) // columns)
-    page = Image.new("RGB", (columns * SIZE[0], rows * SIZE[1]), "white")
-    for place, (name, draw) in enumerate(chosen.items()):
+    tiles = []
+    for name, draw in chosen.items():
         start = time.perf_counter()
         tile = draw().convert("RGB")
         ImageDraw.Draw(tile).text((16, SIZE[1] - 40), name, fill=(60, 66, 74), font=lettering.font(24))
-        page.paste(tile, (place % columns * SIZE[0], place // columns * SIZE[1]))
+        tiles.append(tile)
         print(f"{name}: {time.perf_counter() - start:.1f} s", flush=True)
+    width = min(COLUMNS * SIZE[0], sum(tile.width for tile in tiles))
+    places, right, top = [], 0, 0
+    for tile in tiles:
+        if right + tile.width > width:
+            right, top = 0, top + SIZE[1]
+        places.append((right, top))
+        right += tile.width
+    page = Image.new("RGB", (width, top + SIZE[1]), "white")
+    for tile, at in zip(tiles, places, strict=True):
+        page.paste(tile, at)
     page.resize((page.width // 2, page.height // 2), Image.Resampling.LANCZOS).save(path, optimize=True)
 
 

@@ -20,6 +20,13 @@ class Method(str, Enum):
     EXACT = "exact"
 
 
+class Rule(str, Enum):
+    """When a cell says enough."""
+
+    VERIFIED = "verified"
+    SAMPLES = "samples"
+
+
 def adaptive(
     part: Part,
     *,
@@ -36,6 +43,10 @@ def adaptive(
     method: Annotated[
         Method, typer.Option("--method", help="How leaves answer: from 8 corners, 64 samples, or their triangles.")
     ] = Method.LINEAR,
+    rule: Annotated[
+        Rule,
+        typer.Option("--rule", help="Divide cells until their error is proven, or until 19 samples agree: quicker."),
+    ] = Rule.VERIFIED,
     sign: SignRule = Sign.AUTO,
     weld: Weld = None,
     threads: Threads = None,
@@ -56,6 +67,7 @@ def adaptive(
             growth=growth,
             max_depth=max_depth,
             method=method.value,
+            rule=rule.value,
             threads=threads,
             progress=report,
         )
