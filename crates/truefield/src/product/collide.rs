@@ -4,13 +4,13 @@
 //! the way from one to the other is 2 m: its middle is m from both, and no point is nearer than m to both, or the way by it
 //! would be shorter. If m < 0 they overlap, and a ball of radius -m about the deepest common point lies in both.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::distance::Distance;
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
+use crate::source::waiting::Waiting;
 
 /// Boxes that are divided at a time: the result depends on it, and not on the number of threads.
 const BATCH: usize = 64;
@@ -45,35 +45,6 @@ pub struct Collision {
     pub boxes: usize,
 }
 
-/// A box with what is known of max(f, g) in it.
-struct Candidate {
-    extent: Aabb,
-    lower: f64,
-    /// In which order it was found: ties are settled by it.
-    number: usize,
-}
-
-impl PartialEq for Candidate {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Candidate {}
-
-impl PartialOrd for Candidate {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Candidate {
-    /// The lowest is the greatest: a heap's first.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.lower.total_cmp(&self.lower).then(other.number.cmp(&self.number))
-    }
-}
-
 /// Finds how two solids lie to each other, to `tolerance`, asking about no more than `budget` boxes.
 ///
 /// The interval contains the truth however early the search ends, and is no wider than `tolerance` where the budget was enough
@@ -93,10 +64,10 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
     };
     let (lower, upper, sum, center) = ask(start);
     let mut best = Best { upper, at: center, sum };
-    let mut heap = BinaryHeap::from([Candidate { extent: start, lower, number: 0 }]);
+    let mut heap = BinaryHeap::from([Waiting { bound: lower, number: 0, item: start }]);
     let mut boxes = 1;
     loop {
-        let floor = heap.peek().map_or(best.upper, |first| first.lower).min(best.upper);
+        let floor = heap.peek().map_or(best.upper, |first| first.bound).min(best.upper);
         let known = best.separation(floor);
         run.progress.report("search for contact", boxes.min(budget), budget);
         // Half of it, since a way is twice the least.
@@ -107,11 +78,11 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
         while batch.len() < 8 * BATCH
             && let Some(candidate) = heap.pop()
         {
-            if candidate.lower > best.upper {
+            if candidate.bound > best.upper {
                 heap.clear();
                 break;
             }
-            let (low, middle, high) = (candidate.extent.min, candidate.extent.center(), candidate.extent.max);
+            let (low, middle, high) = (candidate.item.min, candidate.item.center(), candidate.item.max);
             // Along sides that can still be divided.
             let fine = !(middle.cmpgt(low).any() && middle.cmplt(high).any());
             if fine {
@@ -137,7 +108,7 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
             }
             best.sum = best.sum.min(sum);
             if lower <= best.upper {
-                heap.push(Candidate { extent, lower, number: boxes });
+                heap.push(Waiting { bound: lower, number: boxes, item: extent });
             }
             boxes += 1;
         }

@@ -7,5 +7,6 @@ pub mod implicit;
 pub mod mesh;
 pub mod patch;
 pub mod polygon;
+pub(crate) mod waiting;
 
 pub use ask::{bounds, gradients, values};

@@ -1,6 +1,5 @@
 //! The distance to the surface within the domain, from a point: best first over boxes, until both bounds meet.
 
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use super::boxes::{Boxes, halves};
@@ -8,6 +7,7 @@ use super::foot::Foot;
 use super::sheet::{Content, Sheet, Side};
 use super::tape::Tape;
 use crate::geom::{Aabb, DVec3};
+use crate::source::waiting::Waiting;
 
 /// Boxes that one search makes at most, beside those of the tree.
 const MOST: usize = 20_000;
@@ -52,31 +52,6 @@ enum Place {
     Piece(u32),
 }
 
-/// The squared lower bound of a place; the nearest comes out of a heap first, and of those the first that went in.
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    bound: f64,
-    number: u32,
-    place: Place,
-}
-
-impl PartialEq for Entry {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Entry {}
-impl PartialOrd for Entry {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Entry {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.bound.total_cmp(&self.bound).then(other.number.cmp(&self.number))
-    }
-}
-
 /// A box made during the search.
 struct Piece {
     extent: Aabb,
@@ -94,9 +69,10 @@ pub(super) struct Search<'a> {
     p: DVec3,
     /// The side of `p`, or of the nearest point of the domain where `p` lies outside it.
     side: Side,
-    heap: BinaryHeap<Entry>,
+    /// Places by their squared lower bounds.
+    heap: BinaryHeap<Waiting<Place>>,
     pieces: Vec<Piece>,
-    entered: u32,
+    entered: usize,
     /// Squared: what was set aside is no nearer.
     floor: f64,
     upper: f64,
@@ -129,7 +105,7 @@ impl<'a> Search<'a> {
                 self.floor = self.floor.min(entry.bound);
                 break;
             }
-            match entry.place {
+            match entry.item {
                 Place::Node(index) => self.open(index),
                 Place::Sheet(index) => {
                     let node = &self.boxes.nodes[index as usize];
@@ -153,7 +129,7 @@ impl<'a> Search<'a> {
         let limit = self.upper;
         if bound <= limit * limit {
             self.entered += 1;
-            self.heap.push(Entry { bound, number: self.entered, place });
+            self.heap.push(Waiting { bound, number: self.entered, item: place });
         } else {
             self.floor = self.floor.min(bound);
         }

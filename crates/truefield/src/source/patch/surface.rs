@@ -1,6 +1,5 @@
 //! A set of patches ready to be asked.
 
-use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 use std::sync::Arc;
 
@@ -12,6 +11,7 @@ use crate::geom::{Aabb, DVec3, Interval};
 use crate::mesh::TriangleMesh;
 use crate::run::Run;
 use crate::source::mesh::{SignChoice, SignKind, Surface};
+use crate::source::waiting::Waiting;
 
 /// Triangles along the side of a patch, two for each square, that decide sides.
 const FACETS: u32 = 24;
@@ -75,31 +75,6 @@ struct Found {
     point: DVec3,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Entry {
-    bound: f64,
-    number: u32,
-    /// A node, or, from the number of nodes on, a piece of the search.
-    place: u32,
-}
-
-impl PartialEq for Entry {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Entry {}
-impl PartialOrd for Entry {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Entry {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.bound.total_cmp(&self.bound).then(other.number.cmp(&self.number))
-    }
-}
-
 impl Patches {
     /// Fails where there are no patches, control points are not finite, or sides are wanted and the patches do not close up.
     pub fn new(patches: &[Bezier], sides: Sides, run: &Run<'_>) -> Result<Self> {
@@ -140,12 +115,13 @@ impl Patches {
         let (mut floor, mut upper, mut point) = (f64::INFINITY, f64::INFINITY, DVec3::NAN);
         let count = self.nodes.len() as u32;
         let mut entered = 0;
-        let mut enter = |heap: &mut BinaryHeap<Entry>, extent: &Aabb, least: f64, place: u32| {
+        // Items are nodes or, from the number of nodes on, pieces of the search.
+        let mut enter = |heap: &mut BinaryHeap<Waiting<u32>>, extent: &Aabb, least: f64, item: u32| {
             entered += 1;
-            heap.push(Entry { bound: (extent.distance_squared(p) * (1.0 - 8.0 * f64::EPSILON)).max(least), number: entered, place });
+            heap.push(Waiting { bound: (extent.distance_squared(p) * (1.0 - 8.0 * f64::EPSILON)).max(least), number: entered, item });
         };
         enter(&mut heap, &self.extent, 0.0, count - 1);
-        while let Some(Entry { bound, place, .. }) = heap.pop() {
+        while let Some(Waiting { bound, item: place, .. }) = heap.pop() {
             if bound >= floor || bound.sqrt() >= upper - self.accuracy || pieces.len() > MOST {
                 floor = floor.min(bound);
                 break;
