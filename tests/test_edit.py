@@ -58,6 +58,8 @@ def test_a_tool_is_swept_along_its_path(field: tf.AdaptiveField) -> None:
         field.carve(csg.sphere(0.1), path=[[np.nan, 0.0, 0.0]])
     with pytest.raises(tf.TruefieldError, match="radius"):
         field.blend(csg.sphere(0.1), -1.0)
+    with pytest.raises(tf.TruefieldError, match="not AdaptiveField"):
+        field.carve(field)  # type: ignore[arg-type]
 
 
 def test_detail_grows_coarser_and_stays_honest(field: tf.AdaptiveField, points: tf.arguments.Floats) -> None:

@@ -422,7 +422,13 @@ def adaptive_field(
 
 
 def _shape(part: Part | Shape) -> Shape:
-    return part if isinstance(part, Shape) else as_shape(part)
+    if isinstance(part, Shape):
+        return part
+    if not isinstance(part, TriangleMesh | Surface):
+        raise TruefieldError(
+            f"a part is a TriangleMesh, a Surface or a Shape, not {type(part).__name__}; make one of those"
+        )
+    return as_shape(part)
 
 
 def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:

@@ -207,14 +207,14 @@ def evaluate(
 
 
 def field(
-    expression: Expression, domain: Box, *, threads: int | None = None, progress: Progress | None = None
+    expression: Expression, domain: Box | None = None, *, threads: int | None = None, progress: Progress | None = None
 ) -> Shape:
     """The solid where a formula is negative, within a box, with its true distance.
 
     Args:
         expression: a formula of `axes()`; its own values need not be distances.
-        domain: lowest and highest corner. The box bounds the solid: where the formula is negative on a face, the face
-            is surface. The formula is not asked outside.
+        domain: lowest and highest corner; a formula needs one. The box bounds the solid: where the formula is negative
+            on a face, the face is surface. The formula is not asked outside.
         threads: number of threads; all cores by default.
         progress: called as `progress(phase, fraction)`.
 
@@ -225,11 +225,15 @@ def field(
     told from none and bounds are wide; a sign that changes through a pole counts as surface.
 
     Raises:
-        TruefieldError: the domain is no finite box, or the formula is positive in all of it; when asked, the formula is
-            not defined at a point of the domain.
+        TruefieldError: the domain is missing or no finite box, or the formula is positive in all of it; when asked,
+            the formula is not defined at a point of the domain.
     """
     if not isinstance(expression, Expression):
         raise TruefieldError(f"the expression is {expression!r}; make one from implicit.axes()")
+    if domain is None:
+        raise TruefieldError(
+            "a formula may have surface anywhere; give a domain, the two corners of a box"
+        )
     low, high = _box(domain)
     native = expression._native.shape(low, high, threads, progress)
     return Shape(native, f"implicit.field(..., domain=({_corner(low)}, {_corner(high)}))")
