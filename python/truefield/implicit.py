@@ -231,9 +231,7 @@ def field(
     if not isinstance(expression, Expression):
         raise TruefieldError(f"the expression is {expression!r}; make one from implicit.axes()")
     if domain is None:
-        raise TruefieldError(
-            "a formula may have surface anywhere; give a domain, the two corners of a box"
-        )
+        raise TruefieldError("a formula may have surface anywhere; give a domain, the two corners of a box")
     low, high = _box(domain)
     native = expression._native.shape(low, high, threads, progress)
     return Shape(native, f"implicit.field(..., domain=({_corner(low)}, {_corner(high)}))")
