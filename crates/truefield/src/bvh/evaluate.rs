@@ -47,6 +47,16 @@ impl Points {
         }
         points
     }
+
+    /// At least one and at most 64 points; slots beyond repeat the last.
+    pub fn of_some(some: &[DVec3]) -> Self {
+        let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+        for i in 0..BLOCK {
+            let p = some[i.min(some.len() - 1)];
+            (points.x[i], points.y[i], points.z[i]) = (p.x, p.y, p.z);
+        }
+        points
+    }
 }
 
 impl Answers {

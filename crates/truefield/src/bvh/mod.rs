@@ -2,6 +2,7 @@
 
 pub(crate) mod boundary;
 mod build;
+mod cloud;
 pub(crate) mod cover;
 pub(crate) mod descend;
 pub(crate) mod evaluate;

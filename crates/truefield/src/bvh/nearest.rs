@@ -1,6 +1,7 @@
 //! Nearest triangle of one point and of many.
 
-use super::order::Order;
+use super::cloud;
+use super::order::along_curve;
 use super::tree::{ABSENT, LEAF, Packet, Slot, Tree, WIDTH};
 use crate::error::Result;
 use crate::geom::DVec3;
@@ -36,9 +37,6 @@ impl Candidate {
     }
 }
 
-/// Points a worker answers in one go.
-const CHUNK: usize = 1024;
-
 impl Tree {
     /// The nearest triangle that is not farther than `best` already is; the lowest index on ties.
     pub fn nearest(&self, p: DVec3, best: Candidate) -> Candidate {
@@ -47,46 +45,32 @@ impl Tree {
 
     /// The nearest triangle of every point.
     ///
-    /// Points are visited along a space-filling curve, each starting from its predecessor's
-    /// answer; the result does not depend on that order.
+    /// Points that are near each other share what is known about a box around them; the result does not depend on it.
     pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Candidate>> {
         self.nearest_along(points, run, |_, found| found.to_vec())
     }
 
-    /// What `answer` makes of points that follow each other along the curve and of their nearest triangles.
+    /// What `answer` makes of points that follow each other along a space-filling curve and of their nearest triangles.
     ///
-    /// It is given up to 1024 points and as many candidates; which ones does not depend on the threads.
-    pub(crate) fn nearest_along<T: Copy + Send>(
+    /// It is given some thousand points and as many candidates; which ones does not depend on the threads.
+    pub(crate) fn nearest_along<T: Copy + Send + Sync>(
         &self,
         points: &[DVec3],
         run: &Run<'_>,
         answer: impl Fn(&[DVec3], &[Candidate]) -> Vec<T> + Sync,
     ) -> Result<Vec<T>> {
-        let order = Order::along_curve(points);
-        let order = order.indices();
-        let blocks = run.blocks("nearest points", order.len().div_ceil(CHUNK), |block| {
-            let part = &order[block * CHUNK..((block + 1) * CHUNK).min(order.len())];
-            // Fetched together, so that one does not wait for the other.
-            let points: Vec<DVec3> = part.iter().map(|&index| points[index as usize]).collect();
-            let mut found = vec![Candidate::within(f64::INFINITY); part.len()];
-            search_many(self, &points, &mut found);
-            Ok(answer(&points, &found))
-        })?;
-        let Some(&any) = blocks.first().and_then(|block| block.first()) else { return Ok(Vec::new()) };
-        let mut out = vec![any; points.len()];
-        for (&index, answer) in order.iter().zip(blocks.into_iter().flatten()) {
-            out[index as usize] = answer;
-        }
-        Ok(out)
+        along_curve("nearest points", points, run, |points, keys| answer(points, &cloud::nearest(self, points, keys)))
     }
 }
 
 multiversion!(fn search(tree: &Tree, p: DVec3, best: Candidate) -> Candidate = search_body);
-multiversion!(fn search_many(tree: &Tree, points: &[DVec3], out: &mut [Candidate]) = search_many_body);
+multiversion!(
+    /// The nearest triangle of every point, each search starting from the answer before, the first from `warm`; returns the last answer.
+    pub(super) fn search_many(tree: &Tree, points: &[DVec3], warm: Slot, out: &mut [Candidate]) -> Slot = search_many_body
+);
 
 #[inline(always)]
-fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], out: &mut [Candidate]) {
-    let mut warm = Slot(0);
+fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], mut warm: Slot, out: &mut [Candidate]) -> Slot {
     for (&p, out) in points.iter().zip(out) {
         let start = Candidate { distance_squared: tree.facet_at(warm).distance_squared(p), triangle: tree.triangle(warm) };
         *out = search_body::<F>(tree, p, start);
@@ -94,6 +78,7 @@ fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], out: &mut [Candidate
             warm = tree.slots[out.triangle as usize];
         }
     }
+    warm
 }
 
 #[inline(always)]

@@ -1,6 +1,6 @@
 //! Many points at once.
 
-use crate::bvh::order::Order;
+use crate::bvh::order::along_curve;
 use crate::error::Result;
 use crate::geom::DVec3;
 use crate::run::Run;
@@ -19,19 +19,7 @@ pub(super) fn each<T: Send>(points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVe
 }
 
 /// As [`each`], where neighbours in space need the same memory: the points are visited along a space-filling curve.
-pub(super) fn each_along<T: Copy + Send>(points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVec3) -> T + Sync) -> Result<Vec<T>> {
+pub(super) fn each_along<T: Copy + Send + Sync>(points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVec3) -> T + Sync) -> Result<Vec<T>> {
     check_points(points)?;
-    let order = Order::along_curve(points);
-    let blocks = run.blocks("query the field", points.len().div_ceil(CHUNK), |block| {
-        let part = &order.indices()[block * CHUNK..((block + 1) * CHUNK).min(points.len())];
-        // Fetched together, so that one does not wait for the other.
-        let points: Vec<DVec3> = part.iter().map(|&index| points[index as usize]).collect();
-        Ok(points.into_iter().map(&answer).collect::<Vec<_>>())
-    })?;
-    let Some(&any) = blocks.first().and_then(|block| block.first()) else { return Ok(Vec::new()) };
-    let mut out = vec![any; points.len()];
-    for (&index, answer) in order.indices().iter().zip(blocks.into_iter().flatten()) {
-        out[index as usize] = answer;
-    }
-    Ok(out)
+    along_curve("query the field", points, run, |points, _| points.iter().map(|&p| answer(p)).collect())
 }

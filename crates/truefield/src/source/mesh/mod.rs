@@ -113,7 +113,7 @@ impl Surface {
     }
 
     /// `answer` for every point, its nearest triangle and point, and its side, in the tree's units.
-    fn each<T: Copy + Send>(
+    fn each<T: Copy + Send + Sync>(
         &self,
         points: &[DVec3],
         run: &Run<'_>,
