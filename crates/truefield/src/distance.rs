@@ -86,6 +86,15 @@ pub trait Source: Distance {
         Interval::ALL
     }
 
+    /// Contains, for each box of a block, the value minus what is said, interpolated from the box's corners.
+    ///
+    /// The default knows what [`Source::bend`] says of the cell, and that values change by no more than one moves. Shapes
+    /// whose slope jumps along seams of known sides can say more. Fails as [`Source::values`] does.
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        Ok(())
+    }
+
     /// Whether the shape does not depend on z: it has the same cross-section at every height.
     fn is_flat(&self) -> bool {
         false
@@ -99,6 +108,79 @@ pub trait Source: Distance {
     /// No less than how far solving or rounding can move a value from one that changes by no more than one moves.
     fn noise(&self) -> f64 {
         0.0
+    }
+}
+
+/// What was sampled of a shape in a cell: on a lattice, which may be turned.
+#[derive(Clone, Copy, Debug)]
+pub struct SampleBlock<'a> {
+    /// Contains the lattice.
+    pub cell: Aabb,
+    /// Its nodes, x slowest.
+    pub points: &'a [DVec3],
+    /// The values there.
+    pub values: &'a [f64],
+    /// What a field would say there.
+    pub said: &'a [f64],
+    /// Boxes along each axis; none along z where the shape is flat, and the lattice is taken to be the same at every height.
+    pub boxes: [usize; 3],
+    /// The sum of the squared edges of a box.
+    pub square: f64,
+}
+
+impl<'a> SampleBlock<'a> {
+    /// The same nodes with other values, for which something else is said.
+    #[must_use]
+    pub fn with(self, values: &'a [f64], said: &'a [f64]) -> Self {
+        Self { values, said, ..self }
+    }
+
+    /// How many boxes there are.
+    pub fn len(&self) -> usize {
+        self.boxes[0] * self.boxes[1] * self.boxes[2].max(1)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The nodes at the corners of each box, x slowest; along a z without boxes the same ones twice.
+    pub fn corners(&self) -> impl Iterator<Item = [usize; 8]> {
+        let [nx, ny, nz] = self.boxes;
+        let (stride_y, stride_x) = (nz + 1, (nz + 1) * (ny + 1));
+        let up = usize::from(nz > 0);
+        (0..nx).flat_map(move |i| {
+            (0..ny).flat_map(move |j| {
+                (0..nz.max(1)).map(move |k| {
+                    let low = i * stride_x + j * stride_y + k;
+                    std::array::from_fn(|corner| low + (corner & 1) * stride_x + (corner >> 1 & 1) * stride_y + (corner >> 2) * up)
+                })
+            })
+        })
+    }
+
+    /// The values minus what is said, where `between` contains values between samples minus their interpolation.
+    pub fn residual(&self, between: Interval, out: &mut [Interval]) {
+        for (corners, out) in self.corners().zip(out) {
+            let hull = corners.iter().fold(Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY }, |hull, &node| {
+                hull.hull(Interval::exact(self.values[node] - self.said[node]))
+            });
+            *out = hull.plus(between);
+        }
+    }
+
+    /// Between the samples, minus their interpolation: by how the value bends in the cell, and by how far it is to the
+    /// samples, where `noise` is no less than how far a value is from one that changes by no more than one moves.
+    ///
+    /// If the value bends by m at least, it is m/2 |p|^2 and something convex, which lies below its interpolation.
+    pub fn between(&self, bend: Interval, noise: f64) -> Interval {
+        let first = 0.5 * self.square.sqrt() * (1.0 + 1e-12) + 2.0 * noise;
+        let eighth = self.square / 8.0 * (1.0 + 1e-12);
+        Interval {
+            lower: -first.min(if bend.upper < f64::INFINITY { eighth * bend.upper.max(0.0) } else { f64::INFINITY }),
+            upper: first.min(if bend.lower > f64::NEG_INFINITY { eighth * (-bend.lower).max(0.0) } else { f64::INFINITY }),
+        }
     }
 }
 

@@ -21,7 +21,7 @@ pub mod run;
 mod simd;
 pub mod source;
 
-pub use distance::{Closest, Distance, Source};
+pub use distance::{Closest, Distance, SampleBlock, Source};
 pub use error::{Error, Result};
 pub use field::{CompleteField, Continuity, Known, Parts, SampledField};
 pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};

@@ -50,6 +50,12 @@ impl Interval {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
     }
 
+    /// Mirrored at 0.
+    #[must_use]
+    pub fn negated(self) -> Self {
+        Self { lower: -self.upper, upper: -self.lower }
+    }
+
     /// All sums of a number of one and a number of the other.
     #[must_use]
     pub fn plus(self, other: Self) -> Self {

@@ -4,6 +4,7 @@ mod ask;
 pub mod csg;
 pub mod function;
 pub mod implicit;
+pub(crate) mod kink;
 pub mod mesh;
 pub mod patch;
 pub mod polygon;

@@ -78,7 +78,7 @@ pub fn coalesce(samples: &SampledField, rules: &Rules, run: &Run<'_>) -> Result<
         rules.fits(levels.levels.len() as u32, cells, below.len() as u64, rules.tolerance)?;
         nodes = below;
     }
-    levels.make_monotone();
+    levels.derive_errors();
     AdaptiveField::from_levels(&levels, None, run)
 }
 

@@ -102,7 +102,6 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let mut levels = assemble(&cells, Levels::new(root, continuity, rules.accuracy()));
     drop(cells);
     levels.derive_errors();
-    levels.make_monotone();
     AdaptiveField::from_levels(&levels, (leaves == Leaves::Exact).then(|| Arc::clone(surface)), run)
 }
 

@@ -9,7 +9,7 @@ mod facets;
 mod mesh;
 pub(crate) mod verify;
 
-use crate::distance::Source;
+use crate::distance::{SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
 use crate::field::adaptive::{Accuracy, AdaptiveField, Division, Level, LevelKind, Levels, MAX_DEPTH, Record, Root};
@@ -19,10 +19,10 @@ use crate::run::Run;
 pub use crate::field::adaptive::Rule;
 pub use coalesce::coalesce;
 pub use mesh::{Leaves, adaptive_mesh};
-use verify::{Block, Found};
+use verify::{Layout, Said};
 
-/// Cells a worker takes in one go.
-const CHUNK: usize = 512;
+/// Cells whose children a worker takes in one go.
+const CHUNK: usize = 64;
 
 /// Bytes of a cell while its level is built.
 const DRAFT: u64 = 160;
@@ -137,119 +137,174 @@ pub fn root(source: &dyn Source, domain: Option<Aabb>, division: Division) -> Re
 /// as the rules ask, but for what the shape itself leaves open.
 pub fn adaptive(source: &dyn Source, root: Root, rules: &Rules, run: &Run<'_>) -> Result<AdaptiveField> {
     rules.check()?;
-    let corners: [DVec3; 8] = std::array::from_fn(|corner| root.extent.corner(corner));
-    let mut first = [0.0; 8];
-    source.values(&corners, &mut first)?;
-    let mut frontier = vec![Draft { index: [0; 3], corners: first }];
+    let layout = Layout::new(root.division, rules.reconstruction);
     let mut levels = Levels::new(root, Continuity::Everywhere, rules.accuracy());
+    let mut parents = Vec::new();
     let mut cells = 0;
     for depth in 0.. {
-        let builder = Builder { source, root, rules, depth };
-        let parts = run.blocks("build the tree", frontier.len().div_ceil(CHUNK), |block| {
-            builder.divide(&frontier[block * CHUNK..((block + 1) * CHUNK).min(frontier.len())])
-        })?;
-        let next: usize = parts.iter().map(|part| part.children.len()).sum();
-        cells += frontier.len() as u64;
+        let builder = Builder { source, root, rules, layout, depth };
+        // The root has no parent.
+        let parts = if depth == 0 {
+            vec![builder.first()?]
+        } else {
+            let whole = run.blocks("build the tree", parents.len().div_ceil(CHUNK), |block| {
+                builder.divide(&parents[block * CHUNK..((block + 1) * CHUNK).min(parents.len())])
+            })?;
+            cells += (parents.len() * root.division.children()) as u64;
+            whole
+        };
+        let branches: usize = parts.iter().map(|part| part.branches.len()).sum();
         let within = parts.iter().map(|part| part.worst).fold(0.0, f64::max);
-        rules.fits(depth, cells, next as u64, within)?;
+        rules.fits(depth, cells, (branches * root.division.children()) as u64, within)?;
         let mut level = Level::default();
-        let mut children = Vec::with_capacity(next);
+        parents = Vec::with_capacity(branches);
         for part in parts {
             level.append(part.level);
-            children.extend(part.children);
+            parents.extend(part.branches);
         }
         levels.levels.push(level);
-        if children.is_empty() {
+        if parents.is_empty() {
             break;
         }
-        frontier = children;
     }
-    levels.make_monotone();
+    levels.derive_errors();
     AdaptiveField::from_levels(&levels, None, run)
 }
 
-/// A cell before its kind is known.
-struct Draft {
+/// A cell that is to be divided.
+struct Branch {
     index: [u32; 3],
-    corners: [f64; 8],
+    /// Its samples, which are some of its children's; none where they are too many to be kept.
+    samples: Vec<f64>,
 }
 
-/// What became of a chunk of cells.
+/// What became of the children of a chunk of cells.
 #[derive(Default)]
 struct Part {
     level: Level,
-    children: Vec<Draft>,
-    /// Largest error of its cells.
+    branches: Vec<Branch>,
+    /// Largest difference at a sample of what is no leaf, or error of what is one.
     worst: f64,
 }
 
-/// Divides the cells of one level.
+/// A cell and all that is known of it.
+struct Draft<'a> {
+    index: [u32; 3],
+    points: &'a [DVec3],
+    samples: &'a [f64],
+}
+
+/// Divides cells into those of one level.
 struct Builder<'a> {
     source: &'a dyn Source,
     root: Root,
     rules: &'a Rules,
+    layout: Layout,
+    /// Of the cells that are made.
     depth: u32,
 }
 
 impl Builder<'_> {
-    fn divide(&self, cells: &[Draft]) -> Result<Part> {
-        let mut part = Part::default();
-        let block = Block::new(self.root.division, self.rules.reconstruction);
-        let size = block.len();
-        let mut points = Vec::with_capacity(cells.len() * size);
-        for draft in cells {
-            block.points(&self.root.cell(self.depth, draft.index), &mut points);
+    /// The root cell.
+    fn first(&self) -> Result<Part> {
+        let (mut part, mut points) = (Part::default(), Vec::new());
+        self.layout.points(&self.root, 0, [0; 3], &mut points);
+        let samples = self.ask(&points)?;
+        self.judge(&Draft { index: [0; 3], points: &points, samples: &samples }, &mut part)?;
+        Ok(part)
+    }
+
+    /// The children of some cells.
+    fn divide(&self, parents: &[Branch]) -> Result<Part> {
+        let (mut part, mut points, mut asked) = (Part::default(), Vec::new(), Vec::new());
+        let all = self.layout.of_children();
+        for parent in parents {
+            let first = points.len();
+            all.points(&self.root, self.depth - 1, parent.index, &mut points);
+            let known = !parent.samples.is_empty();
+            let new = points[first..].iter().zip(all.are_shared()).filter(|(_, shared)| !(known && *shared));
+            asked.extend(new.map(|(p, _)| *p));
         }
-        let mut values = vec![0.0; points.len()];
-        self.source.values(&points, &mut values)?;
-        if let Some(at) = values.iter().position(|v| !v.is_finite() || v.abs() > f64::from(f32::MAX)) {
-            return Err(Error::invalid(format!(
-                "the shape's distance at {} is {}; a field holds numbers that fit single precision",
-                points[at], values[at]
-            )));
-        }
-        let noise = self.source.noise();
-        for (draft, values) in cells.iter().zip(values.chunks_exact(size)) {
-            let extent = self.root.cell(self.depth, draft.index);
-            let samples = block.samples(&draft.corners, values);
-            let found = block.verify(&extent, &samples, self.source.bend(&extent), noise);
-            let slack = self.source.slack(&extent);
-            self.settle(draft, &block, &samples, &found, slack, &mut part);
+        let mut asked = self.ask(&asked)?.into_iter();
+        let (mut samples, mut child_points, mut child_samples) = (Vec::new(), Vec::new(), Vec::new());
+        for (parent, points) in parents.iter().zip(points.chunks_exact(all.len())) {
+            let mut known = parent.samples.iter().copied();
+            samples.clear();
+            samples.extend(all.are_shared().map(|shared| {
+                let known = if shared { known.next() } else { None };
+                known.or_else(|| asked.next()).unwrap_or(f64::NAN)
+            }));
+            for octant in 0..self.root.division.children() {
+                child_points.clear();
+                child_samples.clear();
+                all.part(points, octant, &mut child_points);
+                all.part(&samples, octant, &mut child_samples);
+                let index = self.root.division.child(parent.index, octant);
+                self.judge(&Draft { index, points: &child_points, samples: &child_samples }, &mut part)?;
+            }
         }
         Ok(part)
     }
 
-    fn settle(&self, draft: &Draft, block: &Block, samples: &[f64], found: &Found, slack: Interval, part: &mut Part) {
-        let allowed = self.rules.allowed(found.least);
-        let enough = |proven: Interval, sampled: f64| match self.rules.rule {
-            Rule::Verified => proven.upper.max(-proven.lower) <= allowed,
-            Rule::Samples => sampled <= allowed,
-        };
-        let corners = draft.corners.map(|v| v as f32);
-        let linear = Record::new(corners, found.linear.plus(slack));
-        let error = found.linear.upper.max(-found.linear.lower);
-        if enough(found.linear, found.linear_samples) {
-            part.level.push(LevelKind::Linear, linear);
-            part.worst = part.worst.max(error);
-            return;
-        }
-        if let Some(cubic) = &found.cubic
-            && enough(cubic.error, cubic.samples)
-        {
-            part.level.push(LevelKind::Cubic, Record::new(corners, cubic.error.plus(slack)));
-            part.level.cubics.push(cubic.thirds);
-            part.worst = part.worst.max(cubic.error.upper.max(-cubic.error.lower));
-            return;
-        }
-        part.worst = part.worst.max(error);
-        if self.depth == self.rules.max_depth {
-            part.level.push(LevelKind::Linear, linear);
-            return;
-        }
-        part.level.push(LevelKind::Branch, linear);
-        let division = self.root.division;
-        for octant in 0..division.children() {
-            part.children.push(Draft { index: division.child(draft.index, octant), corners: block.corners_of_child(samples, octant) });
+    fn ask(&self, points: &[DVec3]) -> Result<Vec<f64>> {
+        let mut values = vec![0.0; points.len()];
+        self.source.values(points, &mut values)?;
+        match values.iter().position(|v| !v.is_finite() || v.abs() > f64::from(f32::MAX)) {
+            Some(at) => Err(Error::invalid(format!(
+                "the shape's distance at {} is {}; a field holds numbers that fit single precision",
+                points[at], values[at]
+            ))),
+            None => Ok(values),
         }
     }
+
+    /// Makes a leaf of a cell that says enough, and else a branch. What the samples alone refuse is not proven.
+    fn judge(&self, draft: &Draft<'_>, part: &mut Part) -> Result<()> {
+        let extent = self.root.cell(self.depth, draft.index);
+        let block = self.layout.block(&extent, draft.points, draft.samples);
+        let allowed = self.rules.allowed(Layout::least(&block, self.source.noise()));
+        let corners = self.layout.corners(draft.samples).map(|v| v as f32);
+        let last = self.depth == self.rules.max_depth;
+        let linear = self.layout.linear(&corners);
+        let worst = linear.worst(&block);
+        if last || worst <= allowed {
+            let error = self.error(&block, &linear)?;
+            if last || self.rules.rule == Rule::Samples || largest(error) <= allowed {
+                part.worst = part.worst.max(largest(error));
+                part.level.push(LevelKind::Linear, Record::new(corners, error.plus(self.source.slack(&extent))));
+                return Ok(());
+            }
+        }
+        if self.rules.reconstruction == Reconstruction::Cubic {
+            let thirds = self.layout.thirds(draft.samples);
+            let cubic = self.layout.cubic(&thirds);
+            if cubic.worst(&block) <= allowed {
+                let error = self.error(&block, &cubic)?;
+                if self.rules.rule == Rule::Samples || largest(error) <= allowed {
+                    part.worst = part.worst.max(largest(error));
+                    part.level.push(LevelKind::Cubic, Record::new(corners, error.plus(self.source.slack(&extent))));
+                    part.level.cubics.push(thirds);
+                    return Ok(());
+                }
+            }
+        }
+        part.worst = part.worst.max(worst);
+        part.level.push(LevelKind::Branch, Record::new(corners, Interval::ALL));
+        // Of a fine lattice the children have few in common.
+        let kept = self.rules.reconstruction == Reconstruction::Linear;
+        part.branches.push(Branch { index: draft.index, samples: if kept { draft.samples.to_vec() } else { Vec::new() } });
+        Ok(())
+    }
+
+    /// Contains the value minus what would be said.
+    fn error(&self, block: &SampleBlock<'_>, said: &Said) -> Result<Interval> {
+        let mut residual = vec![Interval::ALL; block.len()];
+        self.source.residual(&block.with(block.values, &said.values), &mut residual)?;
+        Ok(said.error(block, &residual))
+    }
+}
+
+/// The larger of two ends.
+fn largest(error: Interval) -> f64 {
+    error.upper.max(-error.lower)
 }

@@ -202,14 +202,6 @@ impl<'a> Cell<'a> {
         }
     }
 
-    /// Contains the second derivatives of what a leaf says.
-    pub(crate) fn bend(&self) -> Interval {
-        match self.leaf() {
-            Leaf::Linear => Interval::either_side(self.record().bend(self.extent().size())),
-            Leaf::Cubic(_) | Leaf::Exact(_) => Interval::ALL,
-        }
-    }
-
     /// What holds in a part of the cell after all edits, where `known` held when the cell was sampled.
     #[inline]
     fn age(&self, known: Interval, part: &Aabb) -> Interval {
@@ -273,18 +265,21 @@ pub struct Root {
 }
 
 impl Root {
+    /// A node so many of the `steps` along an edge of a cell, and the same wherever it is a node: rounding once.
+    #[inline]
+    pub(crate) fn coordinate(&self, axis: usize, depth: u32, index: u32, step: u32, steps: u32) -> f64 {
+        let Aabb { min, max } = self.extent;
+        if self.division == Division::Quadtree && axis == 2 {
+            return if step == 0 { min.z } else { max.z };
+        }
+        let cells = f64::from(depth).exp2();
+        min[axis] + (max[axis] - min[axis]) * ((f64::from(index) * f64::from(steps) + f64::from(step)) / (cells * f64::from(steps)))
+    }
+
     /// A cell by its depth and index: the same lattice point has the same coordinates, whatever cell it is a corner of.
     #[inline]
     pub(crate) fn cell(&self, depth: u32, index: [u32; 3]) -> Aabb {
-        let shrink = (-f64::from(depth)).exp2();
-        let size = self.extent.size();
-        let at = |axis: usize, step: u32| {
-            if self.division == Division::Quadtree && axis == 2 {
-                if step == 0 { self.extent.min.z } else { self.extent.max.z }
-            } else {
-                self.extent.min[axis] + size[axis] * (f64::from(index[axis] + step) * shrink)
-            }
-        };
+        let at = |axis: usize, step: u32| self.coordinate(axis, depth, index[axis], step, 1);
         Aabb::new(DVec3::new(at(0, 0), at(1, 0), at(2, 0)), DVec3::new(at(0, 1), at(1, 1), at(2, 1)))
     }
 }

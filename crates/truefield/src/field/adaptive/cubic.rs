@@ -7,7 +7,7 @@ use crate::geom::DVec3;
 const N: usize = 4;
 
 /// The cubics that are 1 at one third and 0 at the others, at `t` from 0 to 1.
-fn weights(t: f64) -> [f64; N] {
+pub(crate) fn weights(t: f64) -> [f64; N] {
     let [a, b, c, d] = [t, 3.0 * t - 1.0, 3.0 * t - 2.0, t - 1.0];
     [-0.5 * b * c * d, 4.5 * a * c * d, -4.5 * a * b * d, 0.5 * a * b * c]
 }

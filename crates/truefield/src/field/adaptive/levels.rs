@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::assemble::{Shape, Tree, page};
 use super::page::{Lists, PAGE_DEPTH, Record, Samples};
-use super::{Accuracy, AdaptiveField, Cell, Division, Edits, Leaf, MAX_DEPTH, Root};
+use super::{Accuracy, AdaptiveField, Cell, Division, Edits, Leaf, MAX_DEPTH, Root, about_corners, differences};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::geom::{DVec3, Interval};
+use crate::geom::Interval;
 use crate::run::Run;
 use crate::source::mesh::Surface;
 
@@ -99,46 +99,28 @@ impl Levels {
     }
 
     /// Gives inner cells the errors that follow from their children's, where those are smaller: what children say is
-    /// trilinear where their parent's interpolation is too, so that the difference is largest at their corners.
-    ///
-    /// For trees without tricubic leaves.
+    /// trilinear where their parent's interpolation is too, so that the difference is largest at their corners. No error is
+    /// less than those of the children, so that a coarser tree never promises more.
     pub fn derive_errors(&mut self) {
-        let group = self.root.division.children();
+        let division = self.root.division;
+        let group = division.children();
         for depth in (1..self.levels.len()).rev() {
             let (above, below) = self.levels.split_at_mut(depth);
-            let (Some(parents), Some(children)) = (above.last_mut(), below.first()) else { return };
+            let (Some(parents), Some(level)) = (above.last_mut(), below.first()) else { return };
+            let mut cubics = level.cubics.iter();
+            let mut children = level.records.chunks_exact(group).zip(level.kinds.chunks_exact(group));
             let branches = parents.kinds.iter().zip(&mut parents.records).filter(|(kind, _)| **kind == LevelKind::Branch);
-            for ((_, parent), group) in branches.zip(children.records.chunks_exact(group)) {
-                let mut error = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
-                for (octant, child) in group.iter().enumerate() {
-                    for corner in 0..8 {
-                        let at = DVec3::from_array([0, 1, 2].map(|axis| match (self.root.division, axis) {
-                            (Division::Quadtree, 2) => (corner >> axis & 1) as f64,
-                            _ => 0.5 * ((octant >> axis & 1) + (corner >> axis & 1)) as f64,
-                        }));
-                        let difference = f64::from(child.corners[corner]) - parent.value(at);
-                        error = error.hull(Interval::exact(difference).plus(child.error()));
-                    }
+            for ((_, parent), (records, kinds)) in branches.zip(&mut children) {
+                let (mut derived, mut least): (Option<Interval>, Interval) = (None, Interval::exact(0.0));
+                for (octant, (child, kind)) in records.iter().zip(kinds).enumerate() {
+                    let samples = if *kind == LevelKind::Cubic { cubics.next() } else { None };
+                    let error = about_corners(child, samples).plus(differences(parent, &child.corners, division, octant));
+                    derived = Some(derived.map_or(error, |derived| derived.hull(error)));
+                    least = least.hull(child.error());
                 }
                 let rounding = 1e-14 * parent.corners.iter().fold(0.0, |size, &v| f64::max(size, f64::from(v.abs())));
-                let error = error.widen(rounding).intersection(parent.error());
-                *parent = Record::new(parent.corners, error);
-            }
-        }
-    }
-
-    /// Widens the errors of cells to at least those of their children: a coarser tree never promises more.
-    pub fn make_monotone(&mut self) {
-        let group = self.root.division.children();
-        for depth in (1..self.levels.len()).rev() {
-            let (above, below) = self.levels.split_at_mut(depth);
-            let (Some(parents), Some(children)) = (above.last_mut(), below.first()) else { return };
-            let branches = parents.kinds.iter().zip(&mut parents.records).filter(|(kind, _)| **kind == LevelKind::Branch);
-            for ((_, parent), group) in branches.zip(children.records.chunks_exact(group)) {
-                for child in group {
-                    parent.lower = parent.lower.min(child.lower);
-                    parent.upper = parent.upper.max(child.upper);
-                }
+                let derived = derived.unwrap_or(Interval::ALL).widen(rounding).intersection(parent.error());
+                *parent = Record::new(parent.corners, derived.hull(least));
             }
         }
     }

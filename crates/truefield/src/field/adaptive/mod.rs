@@ -20,7 +20,7 @@ pub(crate) use assemble::{Patch, Patched};
 pub(crate) use cell::aged_error;
 pub use cell::{Cell, Leaf, Root};
 pub(crate) use coarse::{about_corners, differences};
-pub(crate) use cubic::{bends, third as cubic_third, value as cubic_value};
+pub(crate) use cubic::{bends, third as cubic_third, value as cubic_value, weights as cubic_weights};
 pub(crate) use edits::farthest;
 pub use edits::{Change, Edit, Edits};
 pub use levels::{Level, LevelKind, Levels};

@@ -53,18 +53,6 @@ impl Record {
         (DVec3::new(along(0), along(1), along(2)) / size).length()
     }
 
-    /// No less than the absolute second derivative of the interpolation along any line in a cell of this size.
-    pub(crate) fn bend(&self, size: DVec3) -> f64 {
-        let c = self.corners.map(f64::from);
-        // Along the axes it is linear; along a line the mixed derivatives count twice the product of two parts of a unit.
-        let mixed = |a: usize, b: usize| {
-            let (step, other, third) = (1 << a, 1 << b, 7 - (1 << a) - (1 << b));
-            let twist = |low: usize| (c[low] - c[low + step] - c[low + other] + c[low + step + other]).abs();
-            twist(0).max(twist(third)) / (size[a] * size[b])
-        };
-        mixed(0, 1) + mixed(0, 2) + mixed(1, 2)
-    }
-
     /// Least and largest corner.
     pub fn range(&self) -> Interval {
         let fold = |f: fn(f32, f32) -> f32| f64::from(self.corners.iter().copied().fold(self.corners[0], f));

@@ -2,12 +2,13 @@
 
 use super::operation::Turned;
 use crate::build::adaptive::Reconstruction;
-use crate::build::adaptive::verify::Block;
-use crate::distance::Source;
+use crate::build::adaptive::verify::Layout;
+use crate::distance::{SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::field::adaptive::{AdaptiveField, Cell, Edit, Leaf, ListSide, MAX_DEPTH, Record, Rule, Samples, cubic_third, cubic_value};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
+use crate::source::kink::{self, Operand};
 
 /// Cells a worker takes in one go.
 const CHUNK: usize = 256;
@@ -135,20 +136,19 @@ impl<'a> Divider<'a> {
         for ((piece, extent), reached) in pieces.iter().zip(&extents).zip(reached) {
             out.push(if reached { self.judge(piece, extent, centers.next().unwrap_or(f64::NAN)) } else { self.untouched(piece, extent) });
         }
-        let block = Block::new(self.field.division(), Reconstruction::Linear);
+        let layout = Layout::new(self.field.division(), Reconstruction::Linear);
         let mut points = Vec::new();
-        for (_, extent) in out.iter().zip(&extents).filter(|(outcome, _)| matches!(outcome, Outcome::Sample(..))) {
-            points.extend((0..8).map(|corner| extent.corner(corner)));
-            block.points(extent, &mut points);
+        for (_, piece) in out.iter().zip(pieces).filter(|(outcome, _)| matches!(outcome, Outcome::Sample(..))) {
+            layout.points(&self.field.placement(), piece.depth, piece.index, &mut points);
         }
         let values = self.ask(&points)?;
-        let size = 8 + block.len();
-        let mut samples = points.chunks_exact(size).zip(values.chunks_exact(size));
+        let mut samples = points.chunks_exact(layout.len()).zip(values.chunks_exact(layout.len()));
         for ((outcome, piece), extent) in out.iter_mut().zip(pieces).zip(&extents) {
             if let Outcome::Sample(known, alone) = *outcome
-                && let Some(asked) = samples.next()
+                && let Some((points, values)) = samples.next()
             {
-                *outcome = self.sample(piece, extent, &block, &known, alone, asked);
+                let asked = layout.block(extent, points, values);
+                *outcome = self.sample(piece, layout, &asked, &known, alone)?;
             }
         }
         Ok(out)
@@ -258,59 +258,74 @@ impl<'a> Divider<'a> {
         Outcome::Leaf(Made { corners: turned.map(|v| v as f32), error, own, open, kind }, inside)
     }
 
-    fn sample(
-        &self,
-        piece: &Piece<'a>,
-        extent: &Aabb,
-        block: &Block,
-        known: &Known,
-        alone: Alone,
-        (points, values): (&[DVec3], &[f64]),
-    ) -> Outcome<'a> {
-        let turned = self.turned;
-        let combined: Vec<f64> = points
-            .iter()
-            .zip(values)
-            .map(|(&p, &value)| match alone {
-                Alone::Tool => turned.tool(value),
-                Alone::No => turned.combine(turned.field(piece.old.value(p)), turned.tool(value)),
-            })
-            .collect();
-        let corners: [f64; 8] = std::array::from_fn(|corner| combined[corner]);
-        let samples = block.samples(&corners, &combined[8..]);
-        let tool = turned.tool_range(self.tool.bend(extent));
-        let (bend, steep) = match alone {
-            Alone::Tool => (tool, 1.0),
-            Alone::No => {
-                let steep = piece.old.steepest();
-                (turned.bend([turned.field_range(piece.old.bend()), tool], steep), steep)
-            }
+    /// A cell by what the tool says at its samples.
+    fn sample(&self, piece: &Piece<'a>, layout: Layout, asked: &SampleBlock<'_>, known: &Known, alone: Alone) -> Result<Outcome<'a>> {
+        let (turned, extent) = (self.turned, &asked.cell);
+        let field: Vec<f64> = match alone {
+            Alone::Tool => Vec::new(),
+            Alone::No => asked.points.iter().map(|&p| turned.field(piece.old.value(p))).collect(),
         };
+        let tool = asked.values.iter().map(|&value| turned.tool(value));
+        let combined: Vec<f64> = match alone {
+            Alone::Tool => tool.collect(),
+            Alone::No => field.iter().zip(tool).map(|(&x, y)| turned.combine(x, y)).collect(),
+        };
+        let corners = layout.corners(&combined);
+        let said = layout.linear(&corners.map(|v| v as f32));
+        let block = asked.with(&combined, &said.values);
+        let worst = said.worst(&block);
         // Steeper than a distance: as if it were one with so much noise.
-        let steps = 0.25 * (0..self.field.division().axes()).map(|axis| extent.size()[axis].powi(2)).sum::<f64>().sqrt();
-        let found = block.verify(extent, &samples, bend, self.tool.noise() + 0.5 * (steep - 1.0).max(0.0) * steps * (1.0 + 1e-12));
+        let steep = if alone == Alone::Tool { 1.0 } else { piece.old.steepest() };
+        let noise = self.tool.noise() + 0.25 * (steep - 1.0).max(0.0) * block.square.sqrt() * (1.0 + 1e-12);
         let accuracy = self.field.accuracy();
-        let own = found.linear;
-        let off = match accuracy.rule {
-            Rule::Verified => own.upper.max(-own.lower),
-            Rule::Samples => found.linear_samples,
-        };
-        if off > accuracy.allowed(found.least) && piece.depth < accuracy.max_depth.min(MAX_DEPTH) {
-            return Outcome::Divide;
+        let allowed = accuracy.allowed(Layout::least(&block, noise));
+        let last = piece.depth >= accuracy.max_depth.min(MAX_DEPTH);
+        if worst > allowed && !last {
+            return Ok(Outcome::Divide);
+        }
+        let own = said.error(&block, &self.residual(piece, &block, asked.values, field, noise)?);
+        if accuracy.rule == Rule::Verified && own.upper.max(-own.lower) > allowed && !last {
+            return Ok(Outcome::Divide);
         }
         // Corners are shared with neighbours: beyond the reach they are those of the old tree.
+        let tool = layout.corners(asked.values);
         let shared: [f64; 8] = std::array::from_fn(|corner| {
-            let p = points[corner];
+            let p = extent.corner(corner);
             let x = turned.field(self.field.corner_value(piece.depth, piece.index, corner));
             let reached = self.edits.iter().any(|edit| p.cmpgt(edit.reach.min).all() && p.cmplt(edit.reach.max).all());
-            if reached { turned.combine(x, turned.tool(values[corner])) } else { x }
+            if reached { turned.combine(x, turned.tool(tool[corner])) } else { x }
         });
         let moved = shared.iter().zip(&corners).map(|(a, b)| f64::from((*a as f32 - *b as f32).abs())).fold(0.0, f64::max);
         let (of_values, open) = turned.error(known.errors, known.ranges);
         let error = own.plus(of_values).widen(moved + rounding(extent, &corners));
         let inside = lowest(extent, &corners, of_values.upper + rounding(extent, &corners));
         let made = Made { corners: shared.map(|v| v as f32), error, own: own.plus(of_values), open, kind: MadeKind::Linear };
-        Outcome::Leaf(made, inside)
+        Ok(Outcome::Leaf(made, inside))
+    }
+
+    /// [`Source::residual`] of the new values, from what the tool and, unless it is empty, the field said; `noise` is theirs.
+    fn residual(&self, piece: &Piece<'a>, block: &SampleBlock<'_>, tool: &[f64], field: Vec<f64>, noise: f64) -> Result<Vec<Interval>> {
+        let turned = self.turned;
+        let mut out = vec![Interval::ALL; block.len()];
+        if field.is_empty() {
+            let said: Vec<f64> = block.said.iter().map(|&said| turned.tool(said)).collect();
+            self.tool.residual(&block.with(tool, &said), &mut out)?;
+            out.iter_mut().for_each(|out| *out = turned.tool_range(*out));
+            return Ok(out);
+        }
+        block.residual(block.between(Interval::ALL, noise), &mut out);
+        let mut between = vec![Interval::ALL; block.len()];
+        self.tool.residual(&block.with(tool, tool), &mut between)?;
+        between.iter_mut().for_each(|between| *between = turned.tool_range(*between));
+        // What a linear leaf says is trilinear in any part of it.
+        let within = match piece.old.leaf() {
+            Leaf::Linear => Interval::exact(0.0),
+            Leaf::Cubic(_) | Leaf::Exact(_) => block.between(Interval::ALL, noise),
+        };
+        let values = tool.iter().map(|&value| turned.tool(value)).collect();
+        let mut operands = [Operand { values: field, between: vec![within; block.len()] }, Operand { values, between }];
+        kink::greatest(block, &mut operands, turned.seam(), &mut out);
+        Ok(out)
     }
 
     /// A corner of a cell that was kept, if it is certainly inside.

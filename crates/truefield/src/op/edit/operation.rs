@@ -12,6 +12,7 @@
 use crate::error::{Error, Result};
 use crate::field::adaptive::Change;
 use crate::geom::Interval;
+use crate::source::kink::Seam;
 
 /// What a tool does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,11 +75,11 @@ impl Turned {
     }
 
     pub fn field_range(self, range: Interval) -> Interval {
-        turn(self.field, range)
+        turned(self.field, range)
     }
 
     pub fn tool_range(self, range: Interval) -> Interval {
-        turn(self.tool, range)
+        turned(self.tool, range)
     }
 
     /// The (smooth) maximum.
@@ -92,10 +93,9 @@ impl Turned {
         y.upper + self.smooth <= x.lower
     }
 
-    /// The second derivatives of the maximum, from those of x and y, of which x changes by no more than `slope` per length.
-    pub fn bend(self, [x, y]: [Interval; 2], slope: f64) -> Interval {
-        let fillet = (slope + 1.0) * (slope + 1.0) / (2.0 * self.smooth);
-        Interval { lower: x.lower.min(y.lower), upper: x.upper.max(y.upper) + if self.smooth > 0.0 { fillet } else { f64::INFINITY } }
+    /// How the maximum passes from x to y: it is their mean and f of their difference, f'' = 1 / 2k.
+    pub fn seam(self) -> Seam {
+        if self.smooth > 0.0 { Seam::Smooth(0.5 / self.smooth) } else { Seam::Sharp }
     }
 
     /// Contains the distance minus the maximum of what the field and the tool say, from the same for each of them, as far
@@ -118,6 +118,6 @@ impl Turned {
 }
 
 /// `interval` with its sign changed where `sign` is negative.
-fn turn(sign: f64, interval: Interval) -> Interval {
-    if sign < 0.0 { Interval { lower: -interval.upper, upper: -interval.lower } } else { interval }
+fn turned(sign: f64, interval: Interval) -> Interval {
+    if sign < 0.0 { interval.negated() } else { interval }
 }

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, Interval};
 
 use super::kept::kept;
 use super::level;
 use super::measure::length;
+use crate::source::kink::{self, Operand, Seam};
 
 /// How the edge is filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,6 +150,13 @@ impl Source for Blend {
         }
         let both = self.shapes[0].bend(cell).hull(self.shapes[1].bend(cell));
         Interval { lower: both.lower - self.sharpest(), upper: both.upper }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        let operands = [Operand::of(&*self.shapes[0], block)?, Operand::of(&*self.shapes[1], block)?];
+        kink::least(block, &operands, Seam::Smooth(0.25 * self.sharpest()), out);
+        Ok(())
     }
 
     fn is_flat(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 
@@ -51,28 +51,23 @@ pub fn difference(shape: &Arc<dyn Source>, others: &[Arc<dyn Source>]) -> Result
     Ok(Complement::within(Arc::new(Union::new(parts)?.look_within(extent)), extent))
 }
 
-/// Mirrored at 0.
-pub(super) fn negated(interval: Interval) -> Interval {
-    Interval { lower: -interval.upper, upper: -interval.lower }
-}
-
 impl Distance for Complement {
     fn extent(&self) -> Option<Aabb> {
         self.extent
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        negated(self.shape.at(p))
+        self.shape.at(p).negated()
     }
 
     fn over(&self, cell: &Aabb) -> Interval {
-        negated(self.shape.over(cell))
+        self.shape.over(cell).negated()
     }
 
     fn at_many(&self, points: &[DVec3], out: &mut [Interval]) {
         self.shape.at_many(points, out);
         for out in out {
-            *out = negated(*out);
+            *out = out.negated();
         }
     }
 }
@@ -95,11 +90,20 @@ impl Source for Complement {
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {
-        negated(self.shape.slack(cell))
+        self.shape.slack(cell).negated()
     }
 
     fn bend(&self, cell: &Aabb) -> Interval {
-        negated(self.shape.bend(cell))
+        self.shape.bend(cell).negated()
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        let [values, said] = [block.values, block.said].map(|numbers| numbers.iter().map(|number| -number).collect::<Vec<f64>>());
+        self.shape.residual(&block.with(&values, &said), out)?;
+        for out in out {
+            *out = out.negated();
+        }
+        Ok(())
     }
 
     fn is_flat(&self) -> bool {

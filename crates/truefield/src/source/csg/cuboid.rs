@@ -80,6 +80,17 @@ impl Exact for Cuboid {
         if face { Interval::exact(0.0) } else { convex(low.max(DVec3::ZERO).length()) }
     }
 
+    /// The six planes, where no point lies beyond two of them.
+    fn faces(&self, cell: &Aabb, points: &[DVec3]) -> Vec<(Vec<f64>, Interval)> {
+        let high = self.span(cell).1;
+        if (0..3).filter(|&axis| high[axis] > 0.0).count() > 1 {
+            return Vec::new();
+        }
+        let planes = (0..6).map(|face| (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 }));
+        let height = |p: DVec3, axis: usize, side: f64| side * (p - self.center)[axis] - self.core[axis] - self.rounding;
+        planes.map(|(axis, side)| (points.iter().map(|&p| height(p, axis, side)).collect(), Interval::exact(0.0))).collect()
+    }
+
     /// The least and the greatest distance: it grows with each coordinate's way beyond the faces.
     fn range(&self, cell: &Aabb) -> Interval {
         let (low, high) = self.span(cell);

@@ -1,10 +1,11 @@
 //! Shapes whose signed distance is known everywhere.
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, Interval};
 
 use super::measure::rounding;
+use crate::source::kink::{self, Operand, Seam};
 
 /// A shape with an exact signed distance: all that is needed to be a [`Source`].
 pub trait Exact: Send + Sync {
@@ -19,6 +20,13 @@ pub trait Exact: Send + Sync {
 
     /// [`Source::bend`].
     fn curving(&self, cell: &Aabb) -> Interval;
+
+    /// Smoother numbers of which the distance is the greatest one all over the cell, as inside a convex shape the
+    /// distances of its faces: their values at some points, and how they bend in the cell. None where none are known.
+    fn faces(&self, cell: &Aabb, points: &[DVec3]) -> Vec<(Vec<f64>, Interval)> {
+        let _ = (cell, points);
+        Vec::new()
+    }
 
     /// Contains the distances over a box.
     fn range(&self, cell: &Aabb) -> Interval {
@@ -62,6 +70,19 @@ impl<T: Exact> Source for T {
 
     fn bend(&self, cell: &Aabb) -> Interval {
         self.curving(cell)
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        let bend = self.curving(&block.cell);
+        block.residual(block.between(bend, self.rounding()), out);
+        if !bend.width().is_finite() {
+            let faces = self.faces(&block.cell, block.points).into_iter();
+            let mut operands: Vec<Operand> = faces.map(|(values, bend)| Operand::bent(values, bend, self.rounding(), block)).collect();
+            if !operands.is_empty() {
+                kink::greatest(block, &mut operands, Seam::Sharp, out);
+            }
+        }
+        Ok(())
     }
 
     fn noise(&self) -> f64 {

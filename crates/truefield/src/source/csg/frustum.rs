@@ -141,6 +141,18 @@ impl Exact for Frustum {
         convex(self.range(cell).lower)
     }
 
+    /// The bottom, the side and the top, where no point lies outside.
+    fn faces(&self, cell: &Aabb, points: &[DVec3]) -> Vec<(Vec<f64>, Interval)> {
+        let radial = Self::radial(cell);
+        let outside = |height: f64| height > 0.0;
+        if [0, 1, 2, 3].iter().any(|i| self.heights(radial[i & 1], if i / 2 == 0 { cell.min.z } else { cell.max.z }).into_iter().any(outside)) {
+            return Vec::new();
+        }
+        let values = |line: usize| points.iter().map(|p| self.heights(p.x.hypot(p.y), p.z)[line]).collect();
+        let round = convex(radial[0] / self.along[1]);
+        [Interval::exact(0.0), round, Interval::exact(0.0)].into_iter().enumerate().map(|(line, bend)| (values(line), bend)).collect()
+    }
+
     /// From the middle of the outline of the cell.
     fn range(&self, cell: &Aabb) -> Interval {
         let [near, far] = Self::radial(cell);

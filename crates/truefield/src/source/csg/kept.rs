@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, Interval};
 
 use super::cuboid::Cuboid;
 use super::exact::Exact;
 use super::level;
+use crate::source::kink::{self, Operand, Seam};
 
 /// So many boxes away a shape is asked whether its values are distances.
 const AWAY: f64 = 1e3;
@@ -90,6 +91,13 @@ impl Source for Kept {
             return bend;
         }
         Interval { lower: bend.lower.min(0.0), upper: f64::INFINITY }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        let mut operands = [Operand::of(&*self.shape, block)?, Operand::of(&self.fence, block)?];
+        kink::greatest(block, &mut operands, Seam::Sharp, out);
+        Ok(())
     }
 
     fn is_flat(&self) -> bool {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 
@@ -97,6 +97,11 @@ impl Source for Offset {
 
     fn bend(&self, cell: &Aabb) -> Interval {
         self.shape.bend(cell)
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        let [values, said] = [block.values, block.said].map(|numbers| numbers.iter().map(|number| number + self.distance).collect::<Vec<f64>>());
+        self.shape.residual(&block.with(&values, &said), out)
     }
 
     fn is_flat(&self) -> bool {

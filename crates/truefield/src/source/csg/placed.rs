@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DMat3;
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 
@@ -235,6 +235,19 @@ impl Source for Placed {
     fn bend(&self, cell: &Aabb) -> Interval {
         let bend = self.shape.bend(&self.placement.inward_box(cell));
         Interval { lower: bend.lower / self.placement.scale, upper: bend.upper / self.placement.scale }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        let scale = self.placement.scale;
+        let points = self.inward(block.points);
+        let [values, said] = [block.values, block.said].map(|numbers| numbers.iter().map(|number| number / scale).collect::<Vec<f64>>());
+        let cell = self.placement.inward_box(&block.cell);
+        let square = block.square / (scale * scale) * (1.0 + 1e-12);
+        self.shape.residual(&SampleBlock { cell, points: &points, values: &values, said: &said, boxes: block.boxes, square }, out)?;
+        for out in out {
+            *out = self.scaled(*out).widen(2.0 * self.noise());
+        }
+        Ok(())
     }
 
     fn sided(&self) -> bool {

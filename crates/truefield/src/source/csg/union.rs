@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 
 use super::boxes::Boxes;
 use super::kept::is_exact_outside;
 use super::level;
+use crate::source::kink::{self, Operand, Seam};
 
 /// The union: the least of the values.
 ///
@@ -279,6 +280,21 @@ impl Source for Union {
         let Some(hull) = bends.reduce(Interval::hull) else { return Interval::ALL };
         // Between two parts there is a ridge.
         if found.len() > 1 { Interval { lower: f64::NEG_INFINITY, ..hull } } else { hull }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        block.residual(block.between(Interval::ALL, self.noise), out);
+        let Some(found) = self.candidates(&block.cell, MANY)? else { return Ok(()) };
+        let found = if found.len() > 1 { self.thinned(&block.cell, found) } else { found };
+        if let [only] = found[..] {
+            return self.parts[only.part].residual(block, out);
+        }
+        let operands = found
+            .iter()
+            .map(|candidate| Operand::of(&*self.parts[candidate.part], block))
+            .collect::<Result<Vec<_>>>()?;
+        kink::least(block, &operands, Seam::Sharp, out);
+        Ok(())
     }
 
     fn is_flat(&self) -> bool {
