@@ -145,29 +145,30 @@ impl<'a> SampleBlock<'a> {
         self.len() == 0
     }
 
-    /// The nodes at the corners of each box, x slowest; along a z without boxes the same ones twice.
-    pub fn corners(&self) -> impl Iterator<Item = [usize; 8]> {
+    /// Takes the number of each box and the nodes at its corners, x slowest; along a z without boxes the same ones twice.
+    #[inline]
+    pub fn each_box(&self, mut take: impl FnMut(usize, [usize; 8])) {
         let [nx, ny, nz] = self.boxes;
-        let (stride_y, stride_x) = (nz + 1, (nz + 1) * (ny + 1));
-        let up = usize::from(nz > 0);
-        (0..nx).flat_map(move |i| {
-            (0..ny).flat_map(move |j| {
-                (0..nz.max(1)).map(move |k| {
+        let (stride_y, stride_x, up) = (nz + 1, (nz + 1) * (ny + 1), usize::from(nz > 0));
+        let mut number = 0;
+        for i in 0..nx {
+            for j in 0..ny {
+                for k in 0..nz.max(1) {
                     let low = i * stride_x + j * stride_y + k;
-                    std::array::from_fn(|corner| low + (corner & 1) * stride_x + (corner >> 1 & 1) * stride_y + (corner >> 2) * up)
-                })
-            })
-        })
+                    take(number, std::array::from_fn(|corner| low + (corner & 1) * stride_x + (corner >> 1 & 1) * stride_y + (corner >> 2) * up));
+                    number += 1;
+                }
+            }
+        }
     }
 
     /// The values minus what is said, where `between` contains values between samples minus their interpolation.
     pub fn residual(&self, between: Interval, out: &mut [Interval]) {
-        for (corners, out) in self.corners().zip(out) {
-            let hull = corners.iter().fold(Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY }, |hull, &node| {
-                hull.hull(Interval::exact(self.values[node] - self.said[node]))
-            });
-            *out = hull.plus(between);
-        }
+        self.each_box(|number, corners| {
+            let apart = corners.map(|node| self.values[node] - self.said[node]);
+            let hull = Interval { lower: apart.into_iter().fold(f64::INFINITY, f64::min), upper: apart.into_iter().fold(f64::NEG_INFINITY, f64::max) };
+            out[number] = hull.plus(between);
+        });
     }
 
     /// Between the samples, minus their interpolation: by how the value bends in the cell, and by how far it is to the

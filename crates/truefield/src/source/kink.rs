@@ -46,13 +46,13 @@ pub(crate) enum Seam {
 
 /// Narrows, for each box, what contains the least of the operands minus what is said; the least has the block's values.
 pub(crate) fn least(block: &SampleBlock<'_>, operands: &[Operand], seam: Seam, out: &mut [Interval]) {
-    for ((number, corners), out) in block.corners().enumerate().zip(out) {
+    block.each_box(|number, corners| {
         let found = match seam {
             Seam::Sharp => sharp(block, operands, number, &corners),
             Seam::Smooth(curve) => smooth(block, operands, number, &corners, curve),
         };
-        *out = out.intersection(found);
-    }
+        out[number] = out[number].intersection(found);
+    });
 }
 
 /// [`least`] of the greatest.

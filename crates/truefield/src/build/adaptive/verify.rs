@@ -108,12 +108,17 @@ impl Layout {
 
     /// By trilinear interpolation of the corners.
     pub fn linear(self, corners: &[f32; 8]) -> Said {
-        let weights = |steps: usize| -> Vec<[f64; 2]> {
-            (0..=steps).map(|step| step as f64 / steps.max(1) as f64).map(|part| [1.0 - part, part]).collect()
-        };
-        // In the order of samples: x slowest.
-        let corners: [f64; 8] = std::array::from_fn(|n| f64::from(corners[(n >> 2) | (n & 2) | (n & 1) << 2]));
-        Said { values: spread(&corners, &weights(self.steps), &weights(self.steps_z)), curve: 0.0 }
+        let c = corners.map(f64::from);
+        let along = |low: f64, high: f64, step: usize, steps: usize| low + (high - low) * (step as f64 / steps.max(1) as f64);
+        let mut values = Vec::with_capacity(self.len());
+        for i in 0..=self.steps {
+            let face: [f64; 4] = std::array::from_fn(|row| along(c[2 * row], c[2 * row + 1], i, self.steps));
+            for j in 0..=self.steps {
+                let edge = [along(face[0], face[1], j, self.steps), along(face[2], face[3], j, self.steps)];
+                values.extend((0..=self.steps_z).map(|k| along(edge[0], edge[1], k, self.steps_z)));
+            }
+        }
+        Said { values, curve: 0.0 }
     }
 
     /// The samples at thirds of the edges.

@@ -6,6 +6,8 @@
 use crate::distance::Source;
 use crate::geom::{Aabb, DVec3, Interval};
 
+use super::exit;
+
 /// Directions tried besides the gradient's.
 const AXES: [DVec3; 6] = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
 
@@ -134,7 +136,7 @@ impl<'a> Asked<'a> {
         if way <= self.rounding || self.leads_out() {
             return Interval::around(self.value, if solved > ROUNDED * way { solved } else { 0.0 });
         }
-        let most = self.farthest();
+        let most = self.exit().filter(|exit| *exit <= NEAR * way).unwrap_or_else(|| self.farthest());
         if self.value < 0.0 {
             Interval { lower: -most, upper: self.value + solved }
         } else {
@@ -150,6 +152,20 @@ impl<'a> Asked<'a> {
             return false;
         };
         there >= -4.0 * self.rounding && past >= 0.5 * step
+    }
+
+    /// The way to the other side by tangent planes.
+    fn exit(&self) -> Option<f64> {
+        let found = exit::shortest(2.0 * self.rounding, |step| {
+            let (q, mut slope) = (self.p + step, [DVec3::ZERO]);
+            let beyond = self.beyond(q)?;
+            if step == DVec3::ZERO {
+                return Some((beyond, self.across()));
+            }
+            self.shape.gradients(&[q], &mut slope).ok()?;
+            Some((beyond, if self.value < 0.0 { slope[0] } else { -slope[0] }))
+        });
+        found.map(|way| way * (1.0 + 4.0 * f64::EPSILON))
     }
 
     /// The way to the nearest point that rays find on the other side; infinite where they find none.
@@ -218,6 +234,9 @@ impl<'a> Asked<'a> {
         across * (1.0 + 4.0 * f64::EPSILON)
     }
 }
+
+/// A way out that is no longer than this many times the value is not looked for any further.
+const NEAR: f64 = 16.0;
 
 /// Noise below this part of a distance is rounding.
 const ROUNDED: f64 = 1e-12;

@@ -7,6 +7,7 @@ mod complement;
 mod cuboid;
 mod ellipsoid;
 mod exact;
+mod exit;
 mod frustum;
 mod half_space;
 mod kept;
