@@ -155,7 +155,10 @@ impl<'a> SampleBlock<'a> {
             for j in 0..ny {
                 for k in 0..nz.max(1) {
                     let low = i * stride_x + j * stride_y + k;
-                    take(number, std::array::from_fn(|corner| low + (corner & 1) * stride_x + (corner >> 1 & 1) * stride_y + (corner >> 2) * up));
+                    take(
+                        number,
+                        std::array::from_fn(|corner| low + (corner & 1) * stride_x + (corner >> 1 & 1) * stride_y + (corner >> 2) * up),
+                    );
                     number += 1;
                 }
             }
@@ -166,7 +169,10 @@ impl<'a> SampleBlock<'a> {
     pub fn residual(&self, between: Interval, out: &mut [Interval]) {
         self.each_box(|number, corners| {
             let apart = corners.map(|node| self.values[node] - self.said[node]);
-            let hull = Interval { lower: apart.into_iter().fold(f64::INFINITY, f64::min), upper: apart.into_iter().fold(f64::NEG_INFINITY, f64::max) };
+            let hull = Interval {
+                lower: apart.into_iter().fold(f64::INFINITY, f64::min),
+                upper: apart.into_iter().fold(f64::NEG_INFINITY, f64::max),
+            };
             out[number] = hull.plus(between);
         });
     }

@@ -1,8 +1,11 @@
 //! Adaptive fields: bounds that hold, trees that are the same for any number of threads.
 
+use std::sync::Arc;
+
 use truefield::build::adaptive::{Reconstruction, Rule, Rules, adaptive, root};
 use truefield::field::adaptive::{AdaptiveField, Division};
 use truefield::laws::Random;
+use truefield::source::csg::{Cuboid, Sphere, Union, difference, intersection};
 use truefield::{Aabb, DVec3, Distance, Interval, Result, Run, Source};
 
 /// A ball, of which the bend is known, or nothing.
@@ -237,4 +240,21 @@ fn what_cannot_be_built_is_refused() {
     assert!(root(&Endless, None, Division::Octree).expect_err("no end").to_string().contains("domain"));
     let place = root(&Endless, Some(Aabb::new(DVec3::ZERO, DVec3::ONE)), Division::Octree).expect("a box");
     assert!(adaptive(&Endless, place, &Rules::within(0.1), &Run::default()).expect_err("no numbers").to_string().contains("NaN"));
+}
+
+/// Seams are proven by what lies on both sides of them: proofs cost little more cells than samples do.
+#[test]
+fn seams_take_few_cells() {
+    let balls: Vec<Arc<dyn Source>> = [DVec3::new(-0.5, 0.0, 0.0), DVec3::new(0.5, 0.2, 0.1)]
+        .map(|center| Arc::new(Sphere::new(center, 1.0).expect("a ball")) as Arc<dyn Source>)
+        .to_vec();
+    let cuboid: Arc<dyn Source> = Arc::new(Cuboid::new(DVec3::ZERO, DVec3::new(2.0, 2.0, 0.5)).expect("a box"));
+    let carved = difference(&cuboid, &balls[..1]).expect("a difference");
+    let (union, lens) = (Union::new(balls.clone()).expect("a union"), intersection(&balls).expect("a lens"));
+    let shapes: [(&dyn Source, f64); 4] = [(&union, 1.5), (&lens, 2.0), (&*cuboid, 4.0), (&carved, 3.0)];
+    for (shape, most) in shapes {
+        let leaves = |rule: Rule| build(shape, &Rules { rule, ..Rules::within(0.01) }, 2).statistics().leaves as f64;
+        let ratio = leaves(Rule::Verified) / leaves(Rule::Samples);
+        assert!(ratio <= most, "{ratio} times the cells");
+    }
 }

@@ -9,7 +9,10 @@ const PLANES: usize = 4;
 const ROUNDS: usize = 16;
 
 /// So far back from the end of a way, as a part of it, planes are met again.
-const BACK: f64 = 1e-3;
+const BACK: f64 = 1e-2;
+
+/// Halvings of a way that leads farther out than it has to.
+const HALVES: u32 = 8;
 
 /// A way has to become shorter by this part for another try.
 const GAIN: f64 = 1e-2;
@@ -25,20 +28,27 @@ struct Plane {
 /// met so far would be left, and adding that of the place where this was not enough. Where it was, planes are met anew
 /// from next to the end of the way: those from farther away may have asked for too much.
 ///
-/// `beyond` answers how far out a step leads, and the slope of that there.
-pub(super) fn shortest(clear: f64, mut beyond: impl FnMut(DVec3) -> Option<(f64, DVec3)>) -> Option<f64> {
+/// It starts by looking at the place that `step` leads to. `beyond` answers how far out a step leads, and the slope of that there.
+pub(super) fn shortest(clear: f64, mut step: DVec3, mut beyond: impl FnMut(DVec3) -> Option<(f64, DVec3)>) -> Option<f64> {
     let mut met = |at: DVec3| {
         let (out, slope) = beyond(at).filter(|(_, slope)| slope.is_finite() && *slope != DVec3::ZERO)?;
         // A little beyond the surface, so that places next to it count as left.
         Some((out, Plane { slope, height: 1.5 * clear - out + slope.dot(at) }))
     };
     let (mut planes, mut held) = (Vec::with_capacity(PLANES + 1), Vec::new());
-    let (mut step, mut best) = (DVec3::ZERO, f64::INFINITY);
+    let mut best = f64::INFINITY;
     for _ in 0..ROUNDS {
         let Some((out, plane)) = met(step) else { break };
         if out < clear {
             planes.push(plane);
         } else {
+            // Back to where this way crossed.
+            let (mut short, mut long) = (0.0, 1.0);
+            for _ in 0..HALVES {
+                let middle = 0.5 * (short + long);
+                if met(step * middle).is_some_and(|(out, _)| out >= clear) { long = middle } else { short = middle }
+            }
+            step *= long;
             let (way, before) = (step.length(), best);
             best = best.min(way);
             if !(way < before * (1.0 - GAIN)) {
@@ -46,7 +56,7 @@ pub(super) fn shortest(clear: f64, mut beyond: impl FnMut(DVec3) -> Option<(f64,
             }
             planes.clear();
             let back = held.iter().map(|plane: &Plane| step - plane.slope * (BACK * way / plane.slope.length()));
-            planes.extend(back.filter_map(&mut met).filter(|(out, _)| *out < clear).map(|(_, plane)| plane));
+            planes.extend(back.filter_map(&mut met).map(|(_, plane)| plane));
         }
         let Some(found) = nearest(&planes) else { break };
         (step, held) = found;
@@ -63,7 +73,9 @@ fn nearest(planes: &[Plane]) -> Option<(DVec3, Vec<Plane>)> {
     let mut offer = |x: Option<DVec3>, held: &[Plane]| {
         let Some(x) = x.filter(|x| x.is_finite()) else { return };
         let slip = 1e-9 * (x.length() + f64::MIN_POSITIVE);
-        if planes.iter().all(|plane| plane.slope.dot(x) >= plane.height - slip) && best.as_ref().is_none_or(|(y, _)| x.length() < y.length()) {
+        if planes.iter().all(|plane| plane.slope.dot(x) >= plane.height - slip)
+            && best.as_ref().is_none_or(|(y, _)| x.length() < y.length())
+        {
             best = Some((x, held.to_vec()));
         }
     };
@@ -108,7 +120,7 @@ mod tests {
                 let axis = q.min_position();
                 Some((q[axis], DVec3::AXES[axis]))
             };
-            let way = shortest(1e-9, beyond).unwrap_or(f64::NAN);
+            let way = shortest(1e-9, DVec3::ZERO, beyond).unwrap_or(f64::NAN);
             assert!((way - p.min(DVec3::ZERO).length()).abs() < 1e-8, "{way} from {p}");
         }
     }
@@ -116,6 +128,6 @@ mod tests {
     #[test]
     fn there_is_no_way_between_walls_that_face_each_other() {
         let walls = |step: DVec3| Some((-1.0 - step.x.abs(), DVec3::X * if step.x > 0.0 { -1.0 } else { 1.0 }));
-        assert_eq!(shortest(1e-9, walls), None);
+        assert_eq!(shortest(1e-9, DVec3::ZERO, walls), None);
     }
 }

@@ -145,7 +145,10 @@ impl Exact for Frustum {
     fn faces(&self, cell: &Aabb, points: &[DVec3]) -> Vec<(Vec<f64>, Interval)> {
         let radial = Self::radial(cell);
         let outside = |height: f64| height > 0.0;
-        if [0, 1, 2, 3].iter().any(|i| self.heights(radial[i & 1], if i / 2 == 0 { cell.min.z } else { cell.max.z }).into_iter().any(outside)) {
+        if [0, 1, 2, 3]
+            .iter()
+            .any(|i| self.heights(radial[i & 1], if i / 2 == 0 { cell.min.z } else { cell.max.z }).into_iter().any(outside))
+        {
             return Vec::new();
         }
         let values = |line: usize| points.iter().map(|p| self.heights(p.x.hypot(p.y), p.z)[line]).collect();

@@ -154,9 +154,9 @@ impl<'a> Asked<'a> {
         there >= -4.0 * self.rounding && past >= 0.5 * step
     }
 
-    /// The way to the other side by tangent planes.
+    /// The way to the other side by tangent planes, straight ahead and, where that is long, looking aside first.
     fn exit(&self) -> Option<f64> {
-        let found = exit::shortest(2.0 * self.rounding, |step| {
+        let met = |step: DVec3| {
             let (q, mut slope) = (self.p + step, [DVec3::ZERO]);
             let beyond = self.beyond(q)?;
             if step == DVec3::ZERO {
@@ -164,8 +164,17 @@ impl<'a> Asked<'a> {
             }
             self.shape.gradients(&[q], &mut slope).ok()?;
             Some((beyond, if self.value < 0.0 { slope[0] } else { -slope[0] }))
-        });
-        found.map(|way| way * (1.0 + 4.0 * f64::EPSILON))
+        };
+        let clear = 2.0 * self.rounding;
+        let mut best = exit::shortest(clear, DVec3::ZERO, met).unwrap_or(f64::INFINITY);
+        let way = self.value.abs();
+        if best > ASIDE * way {
+            let (u, w) = self.gradient.any_orthonormal_pair();
+            for aside in [u, -u, w, -w] {
+                best = best.min(exit::shortest(clear, aside * way, met).unwrap_or(f64::INFINITY));
+            }
+        }
+        best.is_finite().then_some(best * (1.0 + 4.0 * f64::EPSILON))
     }
 
     /// The way to the nearest point that rays find on the other side; infinite where they find none.
@@ -234,6 +243,9 @@ impl<'a> Asked<'a> {
         across * (1.0 + 4.0 * f64::EPSILON)
     }
 }
+
+/// Ways out of a corner between two walls at right angles, or three, are shorter than so many times the value.
+const ASIDE: f64 = 1.8;
 
 /// A way out that is no longer than this many times the value is not looked for any further.
 const NEAR: f64 = 16.0;

@@ -100,7 +100,8 @@ impl Source for Offset {
     }
 
     fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
-        let [values, said] = [block.values, block.said].map(|numbers| numbers.iter().map(|number| number + self.distance).collect::<Vec<f64>>());
+        let [values, said] =
+            [block.values, block.said].map(|numbers| numbers.iter().map(|number| number + self.distance).collect::<Vec<f64>>());
         self.shape.residual(&block.with(&values, &said), out)
     }
 

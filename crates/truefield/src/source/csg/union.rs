@@ -289,10 +289,7 @@ impl Source for Union {
         if let [only] = found[..] {
             return self.parts[only.part].residual(block, out);
         }
-        let operands = found
-            .iter()
-            .map(|candidate| Operand::of(&*self.parts[candidate.part], block))
-            .collect::<Result<Vec<_>>>()?;
+        let operands = found.iter().map(|candidate| Operand::of(&*self.parts[candidate.part], block)).collect::<Result<Vec<_>>>()?;
         kink::least(block, &operands, Seam::Sharp, out);
         Ok(())
     }
