@@ -2,6 +2,7 @@
 
 use super::sheet::{Content, Sheet, Side};
 use super::tape::Tape;
+use super::taylor::Taylor;
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
@@ -24,7 +25,7 @@ pub(super) struct Node {
     pub count: u8,
     /// How well the surface of a leaf is known; of an inner node, the worst of its leaves.
     pub known: f32,
-    /// The number of its sheet.
+    /// The number of its sheet, and of its expansion.
     pub sheet: Option<u32>,
 }
 
@@ -33,6 +34,7 @@ pub(super) struct Node {
 pub(super) struct Boxes {
     pub nodes: Vec<Node>,
     pub sheets: Vec<Sheet>,
+    pub taylors: Vec<Taylor>,
     /// Around all that is not outside.
     pub solid: Aabb,
     /// Whether some leaf has no sheet.
@@ -42,14 +44,14 @@ pub(super) struct Boxes {
 /// What became of one box of a level.
 enum Fate {
     Gone(Side),
-    Leaf(Option<Box<Sheet>>, f32),
+    Leaf(Option<Box<(Taylor, Sheet)>>, f32),
     Split,
 }
 
 impl Boxes {
     /// Looks at the domain and all halves of what may hold surface, level by level.
     pub(super) fn build(tape: &Tape, domain: &Aabb, run: &Run<'_>) -> Result<Self> {
-        let mut boxes = Self { nodes: vec![node(*domain)], sheets: Vec::new(), solid: Aabb::EMPTY, rough: false };
+        let mut boxes = Self { nodes: vec![node(*domain)], sheets: Vec::new(), taylors: Vec::new(), solid: Aabb::EMPTY, rough: false };
         let mut level = 0..1;
         for depth in 0..=LEVELS {
             let cells: Vec<Aabb> = boxes.nodes[level.clone()].iter().map(|node| node.extent).collect();
@@ -75,7 +77,9 @@ impl Boxes {
                         boxes.rough |= sheet.is_none();
                         boxes.nodes[index].known = known;
                         boxes.nodes[index].sheet = sheet.map(|sheet| {
-                            boxes.sheets.push(*sheet);
+                            let (taylor, sheet) = *sheet;
+                            boxes.taylors.push(taylor);
+                            boxes.sheets.push(sheet);
                             (boxes.sheets.len() - 1) as u32
                         });
                     }
@@ -162,10 +166,10 @@ fn node(extent: Aabb) -> Node {
 }
 
 fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
-    match Content::of(tape, domain, cell) {
+    match Content::of(tape, cell) {
         Content::Nothing(side) => Fate::Gone(side),
         Content::Sheet(sheet) => {
-            let known = if sound(&sheet, domain) { 0.0 } else { crossed(tape, &sheet.reach) };
+            let known = if sound(&sheet.1, domain) { 0.0 } else { crossed(tape, &sheet.1.extent) };
             Fate::Leaf(Some(sheet), known)
         }
         Content::Open => Fate::Split,
@@ -177,7 +181,7 @@ fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
 fn sound(sheet: &Sheet, domain: &Aabb) -> bool {
     let mut inner = sheet.gradient;
     for axis in 0..3 {
-        if sheet.reach.min[axis] <= domain.min[axis] || sheet.reach.max[axis] >= domain.max[axis] {
+        if sheet.extent.min[axis] <= domain.min[axis] || sheet.extent.max[axis] >= domain.max[axis] {
             inner[axis] = Interval::exact(0.0);
         }
     }

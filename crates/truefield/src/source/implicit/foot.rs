@@ -1,13 +1,14 @@
 //! The nearest point of one sheet: found in plain numbers, then proven.
 
-use super::matrix::{eigenvalues, penalised, times};
+use super::jet::Jet;
+use super::matrix::{eigenvalues, fall, penalised, times};
 use super::number::Number;
 use super::sheet::{Sheet, Side};
 use super::tape::Tape;
 use crate::geom::{Aabb, DVec3, Interval};
 
-/// Newton steps; from a point of the right sheet, three to five do.
-const STEPS: usize = 16;
+/// Newton's method doubles its digits: where a step was this small, in sizes of the box, it is done.
+const DONE: f64 = 1e-9;
 
 /// Where the surface seems nearest to a point within a box.
 #[derive(Clone, Copy, Debug)]
@@ -19,16 +20,16 @@ pub(super) struct Foot {
 }
 
 impl Foot {
-    /// Newton's method on the nearest point of the surface to `p` within `limits`, from `start`.
+    /// Newton's method on the nearest point to `p` within `limits` where the value of `jet` is 0, from `start`.
     ///
     /// Nothing is promised of the result.
-    pub(super) fn find(tape: &Tape, p: DVec3, start: DVec3, limits: &Aabb) -> Option<Self> {
+    pub(super) fn find(jet: impl Fn(DVec3) -> Jet<f64, 6>, p: DVec3, start: DVec3, limits: &Aabb, steps: usize) -> Option<Self> {
         let mut x = start.clamp(limits.min, limits.max);
         let mut multiplier = f64::NAN;
         let mut gradient = DVec3::ZERO;
         let reach = limits.diagonal();
-        for _ in 0..STEPS {
-            let jet = tape.jet::<6>(x);
+        for _ in 0..steps {
+            let jet = jet(x);
             gradient = DVec3::from_array(jet.gradient);
             if !jet.value.is_finite() || !gradient.is_finite() {
                 return None;
@@ -51,7 +52,7 @@ impl Foot {
             }
             let moved = (target - x).length();
             x = target;
-            if moved <= 4.0 * f64::EPSILON * (x.length() + p.length()) {
+            if moved <= DONE * reach {
                 break;
             }
         }
@@ -69,59 +70,44 @@ impl Foot {
     /// No more than the squared distance from `p` to the surface in the sheet's reach.
     ///
     /// On the surface f = 0, so |x - p|^2 equals w(x) = |x - p|^2 + 2 a f + b f^2 for any a and b. Where w is convex, it is
-    /// nowhere below its tangent at the foot, and there the tangent is nearly level.
-    pub(super) fn proof(&self, tape: &Tape, p: DVec3, sheet: &Sheet) -> f64 {
-        let here = tape.jet_over::<0>(&Aabb::new(self.point, self.point));
-        let square = self.gradient.length_squared();
-        let along = {
-            let middle = sheet.hessian.map(|h| 0.5 * (h.lower + h.upper));
-            times(&middle, self.gradient).dot(self.gradient) / square
-        };
-        let steep = (0.5 + (-self.multiplier * along).max(0.0)) / square;
-        let mut best = f64::NEG_INFINITY;
-        for weight in [0.0, steep] {
-            let matrix = penalised(&sheet.hessian, self.multiplier, weight, &sheet.gradient, sheet.value);
-            let least = eigenvalues(&matrix).lower;
-            if !least.is_finite() {
-                continue;
-            }
-            let bound = self.tangent(p, &sheet.reach, here.value, &here.gradient, weight, least);
-            best = best.max(bound);
-            if least >= 0.0 {
-                break;
-            }
+    /// nowhere below its tangent at the foot, and there the tangent is nearly level. `here` is what is certain at the foot.
+    pub(super) fn proof(&self, here: &Jet<Interval, 0>, p: DVec3, sheet: &Sheet) -> f64 {
+        let turned = 1.0 + (self.multiplier * sheet.turns.lower).min(self.multiplier * sheet.turns.upper);
+        let least = turned - 1e-14 * (1.0 + self.multiplier.abs() * sheet.turns.upper.max(-sheet.turns.lower));
+        let best = if least.is_finite() { self.tangent(p, sheet, here, 0.0, least) } else { f64::NEG_INFINITY };
+        if least >= 0.0 {
+            return best;
         }
-        best
+        let square = self.gradient.length_squared();
+        let along = times(&sheet.hessian.map(|h| 0.5 * (h.lower + h.upper)), self.gradient).dot(self.gradient) / square;
+        let weight = (0.5 + (-self.multiplier * along).max(0.0)) / square;
+        let least = eigenvalues(&penalised(&sheet.hessian, self.multiplier, weight, &sheet.gradient, sheet.value)).lower;
+        if least.is_finite() { best.max(self.tangent(p, sheet, here, weight, least)) } else { best }
     }
 
-    /// The lower bound over `reach` when half the second derivatives of w have no eigenvalue below `least`.
-    fn tangent(&self, p: DVec3, reach: &Aabb, value: Interval, gradient: &[Interval; 3], weight: f64, least: f64) -> f64 {
-        let way = self.point - p;
+    /// The lower bound over the box of `sheet` when half the second derivatives of w have no eigenvalue below `least`.
+    fn tangent(&self, p: DVec3, sheet: &Sheet, here: &Jet<Interval, 0>, weight: f64, least: f64) -> f64 {
+        let (way, reach, value) = (self.point - p, &sheet.extent, here.value);
         let (a, b) = (Interval::exact(2.0 * self.multiplier), Interval::exact(weight));
         let constant = value.mul(a).add(value.square().mul(b));
         let slope = a.add(value.mul(b).mul(Interval::exact(2.0)));
-        let (mut level, mut steep) = (0.0, 0.0);
+        let (mut loss, mut size) = (0.0, 0.0);
         for axis in 0..3 {
             let back = Interval::around(2.0 * way[axis], 2.0 * f64::EPSILON * way[axis].abs());
-            let tilt = gradient[axis].mul(slope).add(back);
+            let tilt = here.gradient[axis].mul(slope).add(back);
             let (low, high) = (reach.min[axis] - self.point[axis], reach.max[axis] - self.point[axis]);
-            level += (tilt.lower * high).min(tilt.upper * high).min(tilt.lower * low).min(tilt.upper * low).min(0.0);
-            steep += tilt.lower.abs().max(tilt.upper.abs()).powi(2);
-        }
-        let far = (reach.max - self.point).max(self.point - reach.min).length_squared();
-        let mut loss = level * (1.0 + 1e-14) + least.min(0.0) * far * (1.0 + 1e-14);
-        if least > 0.0 {
-            // A bowl falls below its middle by no more than the square of its tilt.
-            loss = loss.max(-steep / (4.0 * least) * (1.0 + 1e-14));
+            loss += fall(tilt.lower, least, low, high).min(fall(tilt.upper, least, low, high));
+            let reach = high.max(-low);
+            size += (tilt.lower.abs().max(tilt.upper.abs()) + least.abs() * reach) * reach;
         }
         let square = way.length_squared() * (1.0 - 8.0 * f64::EPSILON);
-        square + constant.lower + loss
+        square + constant.lower + loss - 1e-14 * size
     }
 
     /// How far from `p` a point next to the foot is that certainly lies on `side`; infinite where none is found.
     ///
-    /// Where `p` lies on the other side, the surface is not farther.
-    pub(super) fn beyond(&self, tape: &Tape, p: DVec3, side: Side, limits: &Aabb) -> f64 {
+    /// Where `p` lies on the other side, the surface is not farther. `here` is what is certain at the foot.
+    pub(super) fn beyond(&self, tape: &Tape, here: &Jet<Interval, 0>, p: DVec3, side: Side, limits: &Aabb) -> f64 {
         let mut direction = self.gradient * side.sign();
         for axis in 0..3 {
             let out = direction[axis];
@@ -130,7 +116,10 @@ impl Foot {
             }
         }
         let direction = direction.normalize_or_zero();
-        let mut step = 2.0 * f64::EPSILON * (self.point.length() + p.length() + limits.diagonal());
+        // So far the value at the foot may be from 0.
+        let doubt = 1.5 * here.value.upper.max(-here.value.lower) / self.gradient.length();
+        let least = 2.0 * f64::EPSILON * (self.point.length() + p.length() + limits.diagonal());
+        let mut step = if doubt.is_finite() { least.max(doubt) } else { least };
         for _ in 0..14 {
             let there = (self.point + direction * step).clamp(limits.min, limits.max);
             if Side::of(tape.certain(there)) == Some(side) {

@@ -53,8 +53,8 @@ fn diagonal(matrix: [f64; 6]) -> ([f64; 3], f64) {
                 continue;
             }
             let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-            let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-            let c = 1.0 / t.hypot(1.0);
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
             let s = t * c;
             for k in 0..3 {
                 (m[k][p], m[k][q]) = (c * m[k][p] - s * m[k][q], s * m[k][p] + c * m[k][q]);
@@ -66,6 +66,14 @@ fn diagonal(matrix: [f64; 6]) -> ([f64; 3], f64) {
     }
     let off = (m[0][1].powi(2) + m[0][2].powi(2) + m[1][2].powi(2)) * 2.0;
     ([m[0][0], m[1][1], m[2][2]], off.sqrt())
+}
+
+/// The least of `slope` u + `least` u^2 for u from `low` to `high`.
+pub(super) fn fall(slope: f64, least: f64, low: f64, high: f64) -> f64 {
+    let at = |u: f64| (slope + least * u) * u;
+    let ends = at(low).min(at(high));
+    let middle = -slope / (2.0 * least);
+    if least > 0.0 && middle > low && middle < high { at(middle).min(ends) } else { ends }
 }
 
 /// The identity, plus `scale` times `matrix`, plus `weight` times (`gradient gradient^T` + `value` `matrix`).

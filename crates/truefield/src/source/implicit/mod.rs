@@ -12,6 +12,7 @@ mod search;
 mod shape;
 mod sheet;
 mod tape;
+mod taylor;
 
 pub use expression::{Binary, Expression, Unary};
 pub use shape::Implicit;

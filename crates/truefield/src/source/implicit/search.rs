@@ -2,10 +2,11 @@
 
 use std::collections::BinaryHeap;
 
-use super::boxes::{Boxes, halves};
+use super::boxes::{Boxes, Node, halves};
 use super::foot::Foot;
 use super::sheet::{Content, Sheet, Side};
 use super::tape::Tape;
+use super::taylor::Taylor;
 use crate::geom::{Aabb, DVec3};
 use crate::source::waiting::Waiting;
 
@@ -16,10 +17,13 @@ const MOST: usize = 20_000;
 const MANY: usize = 100;
 
 /// The box around a foot that is tried first, in sizes of the box it was found in, to either side.
-const WIDE: f64 = 1.5;
+const WIDE: f64 = 0.5;
 
 /// How often that is halved.
 const SHRINKS: usize = 8;
+
+/// Newton steps; from a point of the right sheet, two or three do.
+const STEPS: usize = 16;
 
 /// How exactly the surface is located.
 #[derive(Clone, Copy, Debug)]
@@ -47,15 +51,18 @@ pub(super) struct Found {
 #[derive(Clone, Copy, Debug)]
 enum Place {
     Node(u32),
-    /// A leaf of the tree, or a piece of one, whose sheet has been looked at.
-    Sheet(u32),
+    Leaf(u32),
+    /// A leaf again, by second derivatives, and a point where the surface in it may be nearest.
+    Sheet(u32, DVec3),
     Piece(u32),
 }
 
 /// A box made during the search.
+#[derive(Clone, Copy)]
 struct Piece {
     extent: Aabb,
-    sheet: Option<Box<Sheet>>,
+    /// If it has one sheet, that, and where it may be nearest.
+    sheet: Option<(Taylor, Sheet, DVec3)>,
     /// Whether a foot is worth looking for: every other time that a box is cut.
     fresh: bool,
 }
@@ -72,7 +79,6 @@ pub(super) struct Search<'a> {
     /// Places by their squared lower bounds.
     heap: BinaryHeap<Waiting<Place>>,
     pieces: Vec<Piece>,
-    entered: usize,
     /// Squared: what was set aside is no nearer.
     floor: f64,
     upper: f64,
@@ -88,7 +94,7 @@ impl<'a> Search<'a> {
     pub(super) fn new(tape: &'a Tape, domain: &'a Aabb, boxes: &'a Boxes, accuracy: Accuracy, p: DVec3, side: Side, limit: f64) -> Self {
         let (heap, pieces, proven, feet) = (BinaryHeap::new(), Vec::new(), Vec::new(), Vec::new());
         let (floor, upper) = (f64::INFINITY, limit);
-        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, entered: 0, floor, upper, foot: None, proven, feet }
+        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, floor, upper, foot: None, proven, feet }
     }
 
     /// Searches.
@@ -96,26 +102,30 @@ impl<'a> Search<'a> {
         if !self.boxes.nodes.is_empty() {
             self.enter(0.0, Place::Node(0));
         }
-        while let Some(entry) = self.heap.pop() {
-            if entry.bound >= self.floor || entry.bound.max(0.0).sqrt() >= self.upper - self.enough() {
-                self.floor = self.floor.min(entry.bound);
+        while let Some(Waiting { bound, item, .. }) = self.heap.pop() {
+            if bound >= self.upper * self.upper {
                 break;
             }
-            if self.pieces.len() > MOST {
-                self.floor = self.floor.min(entry.bound);
-                break;
+            // What is only a number of boxes says nothing itself, so that the answer does not depend on how boxes are grouped.
+            if let Place::Node(index) = item {
+                self.open(index);
+                continue;
             }
-            match entry.item {
-                Place::Node(index) => self.open(index),
-                Place::Sheet(index) => {
+            if bound >= self.floor || self.is_enough(bound) || self.pieces.len() > MOST {
+                self.floor = self.floor.min(bound);
+                continue;
+            }
+            match item {
+                Place::Node(_) => {}
+                Place::Leaf(index) => self.look(bound, index),
+                Place::Sheet(index, near) => {
                     let node = &self.boxes.nodes[index as usize];
-                    let sheet = node.sheet.map(|sheet| &self.boxes.sheets[sheet as usize]);
-                    self.settle(entry.bound, &node.extent, sheet, true);
+                    let sheet = node.sheet.map(|sheet| (self.boxes.taylors[sheet as usize], self.boxes.sheets[sheet as usize], near));
+                    self.settle(bound, &Piece { extent: node.extent, sheet, fresh: true });
                 }
                 Place::Piece(index) => {
-                    let Piece { extent, sheet, fresh } = &mut self.pieces[index as usize];
-                    let (extent, sheet, fresh) = (*extent, sheet.take(), *fresh);
-                    self.settle(entry.bound, &extent, sheet.as_deref(), fresh);
+                    let piece = self.pieces[index as usize];
+                    self.settle(bound, &piece);
                 }
             }
         }
@@ -126,136 +136,166 @@ impl<'a> Search<'a> {
     }
 
     fn enter(&mut self, bound: f64, place: Place) {
-        let limit = self.upper;
-        if bound <= limit * limit {
-            self.entered += 1;
-            self.heap.push(Waiting { bound, number: self.entered, item: place });
-        } else {
-            self.floor = self.floor.min(bound);
+        // Of equals, what holds others comes first, then what was made first.
+        let number = match place {
+            Place::Node(index) => index as usize,
+            Place::Leaf(index) => 1 << 32 | index as usize,
+            Place::Sheet(index, _) => 2 << 32 | index as usize,
+            Place::Piece(index) => 3 << 32 | index as usize,
+        };
+        if bound < self.upper * self.upper {
+            self.heap.push(Waiting { bound, number, item: place });
         }
     }
 
-    /// The children of a node, or the sheet of a leaf.
+    /// The children of a node.
     fn open(&mut self, index: u32) {
         let boxes = self.boxes;
         let node = &boxes.nodes[index as usize];
-        for child in node.first..node.first + u32::from(node.count) {
-            let extent = &boxes.nodes[child as usize].extent;
-            let place = if boxes.nodes[child as usize].count == 0 { Place::Sheet(child) } else { Place::Node(child) };
-            let sheet = boxes.nodes[child as usize].sheet.map(|sheet| &boxes.sheets[sheet as usize]);
-            let bound = self.bound(extent, sheet);
-            self.enter(bound, place);
-        }
-        if node.count == 0 {
-            let sheet = node.sheet.map(|sheet| &boxes.sheets[sheet as usize]);
-            let bound = self.bound(&node.extent, sheet);
-            self.enter(bound, Place::Sheet(index));
+        let children = if node.count == 0 { index..index + 1 } else { node.first..node.first + u32::from(node.count) };
+        for child in children {
+            let Node { extent, count, sheet, .. } = &boxes.nodes[child as usize];
+            let bound = match sheet {
+                Some(sheet) => boxes.taylors[*sheet as usize].rough(self.p, extent),
+                None => extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON),
+            };
+            self.enter(bound, if *count == 0 { Place::Leaf(child) } else { Place::Node(child) });
         }
     }
 
-    /// No more than the squared distance to the surface in a box.
-    fn bound(&self, extent: &Aabb, sheet: Option<&Sheet>) -> f64 {
-        match sheet {
-            Some(sheet) => sheet.least(self.p, extent).0,
-            None => extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON),
+    /// Looks at a leaf again, by second derivatives.
+    fn look(&mut self, bound: f64, index: u32) {
+        let node = &self.boxes.nodes[index as usize];
+        match node.sheet {
+            Some(sheet) => {
+                let (least, near) = self.boxes.taylors[sheet as usize].least(self.p, &node.extent);
+                let bound = bound.max(least);
+                if self.is_enough(bound) {
+                    self.floor = self.floor.min(bound);
+                } else {
+                    self.enter(bound, Place::Sheet(index, near));
+                }
+            }
+            None => self.settle(bound, &Piece { extent: node.extent, sheet: None, fresh: true }),
         }
     }
 
     /// Proves how near the surface of a box is, or cuts the box.
-    fn settle(&mut self, bound: f64, extent: &Aabb, sheet: Option<&Sheet>, fresh: bool) {
+    fn settle(&mut self, bound: f64, piece: &Piece) {
+        let extent = &piece.extent;
         if self.is_proven(extent) {
             return;
         }
-        match sheet {
-            Some(sheet) => {
-                if (fresh || self.upper == f64::INFINITY) && (self.prove(bound, extent, sheet) || self.is_proven(extent)) {
-                    return;
-                }
-                if extent.size().max_element() <= 0.125 * self.accuracy.smooth {
-                    self.floor = self.floor.min(bound);
-                    return;
-                }
+        let size = extent.size().max_element();
+        if let Some((_, sheet, near)) = &piece.sheet {
+            if (piece.fresh || self.upper == f64::INFINITY) && self.prove(sheet, *near) {
+                return;
             }
-            None => {
-                self.probe(extent);
-                let near = bound.max(0.0).sqrt() >= self.upper - self.accuracy.rough;
-                if near || extent.size().max_element() <= 0.125 * self.accuracy.rough {
-                    if !near {
-                        self.scan(extent);
-                    }
-                    self.floor = self.floor.min(bound);
-                    return;
+            if size <= 0.125 * self.accuracy.smooth {
+                self.floor = self.floor.min(bound);
+                return;
+            }
+        } else {
+            self.probe(extent);
+            let close = bound.max(0.0).sqrt() >= self.upper - self.accuracy.rough;
+            if close || size <= 0.125 * self.accuracy.rough {
+                if !close {
+                    self.scan(extent);
                 }
+                self.floor = self.floor.min(bound);
+                return;
             }
         }
-        for part in halves(extent) {
-            let sheet = match sheet {
-                Some(_) if self.is_proven(&part) => continue,
-                Some(sheet) => Some(Box::new(sheet.part(self.tape, &part))),
-                None => match Content::of(self.tape, self.domain, &part) {
+        for extent in halves(extent) {
+            let mut bound = bound.max(extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON));
+            // What is known of the whole box may do.
+            if let Some((taylor, ..)) = &piece.sheet {
+                bound = bound.max(taylor.rough(self.p, &extent));
+                if bound < self.upper * self.upper {
+                    bound = bound.max(taylor.least(self.p, &extent).0);
+                }
+            }
+            if self.is_proven(&extent) {
+                continue;
+            }
+            if self.is_enough(bound) {
+                self.floor = self.floor.min(bound);
+                continue;
+            }
+            let content = if piece.sheet.is_some() {
+                let sheet = Sheet::over(self.tape, &extent);
+                Some((Taylor::of(self.tape, &sheet), sheet))
+            } else {
+                match Content::of(self.tape, &extent) {
                     Content::Nothing(_) => continue,
-                    Content::Sheet(sheet) => Some(sheet),
+                    Content::Sheet(sheet) => Some(*sheet),
                     Content::Open => None,
-                },
+                }
             };
-            let bound = self.bound(&part, sheet.as_deref()).max(bound);
-            self.pieces.push(Piece { extent: part, sheet, fresh: !fresh });
+            let sheet = content.map(|(taylor, sheet)| {
+                bound = bound.max(taylor.rough(self.p, &extent));
+                let (least, near) = taylor.least(self.p, &extent);
+                bound = bound.max(least);
+                (taylor, sheet, near)
+            });
+            self.pieces.push(Piece { extent, sheet, fresh: !piece.fresh });
             self.enter(bound, Place::Piece((self.pieces.len() - 1) as u32));
         }
+    }
+
+    /// Whether a squared lower bound is as good as wanted.
+    fn is_enough(&self, bound: f64) -> bool {
+        bound.max(0.0).sqrt() >= self.upper - self.enough()
     }
 
     fn is_proven(&self, extent: &Aabb) -> bool {
         self.proven.iter().any(|proven| proven.contains(extent.min) && proven.contains(extent.max))
     }
 
-    /// Looks for the foot on a sheet; whether what is known of the box is as good as wanted.
-    fn prove(&mut self, bound: f64, extent: &Aabb, sheet: &Sheet) -> bool {
+    /// Looks for the foot on the sheet of a box, from `near`; whether what is known of the box is as good as wanted.
+    fn prove(&mut self, sheet: &Sheet, near: DVec3) -> bool {
+        let extent = &sheet.extent;
         // Around a foot that is known, only smaller boxes help.
         if self.feet.iter().any(|foot| extent.contains(*foot)) {
             return false;
         }
-        let (_, start) = sheet.least(self.p, extent);
-        let Some(foot) = Foot::find(self.tape, self.p, start, &sheet.reach) else { return false };
+        let Some(foot) = Foot::find(|x| self.tape.jet(x), self.p, near, extent, STEPS) else { return false };
+        let here = self.tape.jet_over::<0>(&Aabb::new(foot.point, foot.point));
         let far = (foot.point - self.p).length();
         if far < self.upper {
-            let reached = foot.beyond(self.tape, self.p, self.side.other(), self.domain);
+            let reached = foot.beyond(self.tape, &here, self.p, self.side.other(), self.domain);
             if reached < self.upper {
                 self.upper = reached;
                 self.foot = Some(foot.point);
             }
         }
-        if !foot.is_held(&sheet.reach, self.domain)
-            && far <= self.upper
-            && self.feet.iter().all(|known| (*known - foot.point).length() > self.accuracy.smooth)
-        {
-            self.feet.push(foot.point);
-            // The wider the box around the foot, the more is proven at once; the smaller, the less derivatives differ.
-            let mut half = WIDE * extent.size().max_element();
-            for _ in 0..SHRINKS {
-                let around = Aabb::new((foot.point - half).max(self.domain.min), (foot.point + half).min(self.domain.max));
-                if self.accept(foot.proof(self.tape, self.p, &Sheet::around(self.tape, around)), &around) {
-                    break;
-                }
-                half *= 0.5;
-            }
-            return self.is_proven(extent);
+        let proof = foot.proof(&here, self.p, sheet);
+        if self.is_enough(proof) {
+            self.floor = self.floor.min(proof);
+            return true;
         }
-        self.accept(foot.proof(self.tape, self.p, sheet).max(bound), &sheet.reach)
+        if foot.is_held(extent, self.domain) || far > self.upper {
+            return false;
+        }
+        self.feet.push(foot.point);
+        // The wider the box around the foot, the more is proven at once; the smaller, the less derivatives differ.
+        let mut half = WIDE * extent.size().max_element();
+        for _ in 0..SHRINKS {
+            let around = Aabb::new((foot.point - half).max(self.domain.min), (foot.point + half).min(self.domain.max));
+            let proof = foot.proof(&here, self.p, &Sheet::over(self.tape, &around));
+            if self.is_enough(proof) {
+                self.floor = self.floor.min(proof);
+                self.proven.push(around);
+                break;
+            }
+            half *= 0.5;
+        }
+        self.is_proven(extent)
     }
 
     /// How far apart the bounds may be: where much of the surface is nearly as far, less is asked for.
     fn enough(&self) -> f64 {
         if self.pieces.len() < MANY { self.accuracy.smooth } else { self.accuracy.hard }
-    }
-
-    /// Notes what is proven of the surface in a box, if that is as good as wanted.
-    fn accept(&mut self, proof: f64, within: &Aabb) -> bool {
-        let good = proof.max(0.0).sqrt() >= self.upper - self.enough();
-        if good {
-            self.floor = self.floor.min(proof);
-            self.proven.push(*within);
-        }
-        good
     }
 
     /// Looks for the other side around a box that is as small as boxes get.
