@@ -5,7 +5,8 @@
 //! function is the function itself.
 //! 1. u^2 - |p|^2 is the least of affine functions, so concave: u^2 >= I(u^2) - I(|p|^2) + |p|^2 >= I(u)^2 - S; see `spread`.
 //! 2. u is at most the distance to any point or triangle of the surface, which is convex: u - I is at most the largest
-//!    d(T) - u at the corners.
+//!    d(T) - u at the corners. It is at most any mean of such distances too, so that where one of two is p too large at
+//!    some corners, and the other q at the rest, u - I is at most p q / (p + q); see `mixed`.
 //! 3. u is one of the d(T), each of which lies above its tangent at the cell's centre: u - I is at least the least over T
 //!    of the least (tangent - u) at the corners.
 //! 4. Near a sound piece of surface, signed: let all normals n of the list be within a of their mean, and q, on triangle T,
@@ -51,7 +52,8 @@ pub(super) struct At<'a> {
     /// The side of all its points, where that is known.
     pub side: Option<Side>,
     pub corners: [Corner; 8],
-    pub center: Corner,
+    /// A point of the surface near its centre, where one is known.
+    pub center: Option<DVec3>,
     /// What is said at the corners, and between them by interpolation: by the cell itself or by one that it is a part of.
     pub told: [f64; 8],
     /// Every triangle that can be nearest in it.
@@ -74,8 +76,17 @@ impl<'a> Prover<'a> {
         Self { surface }
     }
 
-    /// Contains the distance minus the interpolation of what is told: without a look at the list.
-    pub fn coarse(&self, at: &At<'_>) -> Interval {
+    /// Unsigned distances in a cell, by its corners: by 1, or as far as one moves.
+    pub fn range(&self, cell: &Aabb, corners: &[Corner; 8]) -> Range {
+        let (least, most) = ends(&corners.map(|corner| corner.value.abs()));
+        let (radius, slack) = (cell.radius(), self.slack(cell));
+        let lower = (least * least - radius * radius * (1.0 + 1e-12)).max(0.0).sqrt() - slack;
+        Range { lower: lower.max(0.0), upper: most + radius + slack }
+    }
+
+    /// Contains the distance minus the interpolation of what is told, without a look at the list; from above no sharper
+    /// than `limit`.
+    pub fn coarse(&self, at: &At<'_>, limit: f64) -> Interval {
         let corners = &at.corners;
         let told = at.told;
         let (low, high) = ends(&told);
@@ -86,21 +97,23 @@ impl<'a> Prover<'a> {
             _ => Interval::either_side(upper),
         };
         let mut known = Interval { lower: range.lower - high, upper: range.upper - low };
-        let rounding = hull(std::array::from_fn(|j| corners[j].value - told[j]));
         let size = at.cell.size();
         if corners.iter().all(|corner| corner.certain) && (at.side.is_some() || self.surface.side_changes_at_surface_only()) {
-            known = known.intersection(rounding.widen(0.5 * size.length() * (1.0 + 1e-12)));
+            let differences = hull(std::array::from_fn(|j| corners[j].value - told[j]));
+            known = known.intersection(differences.widen(0.5 * size.length() * (1.0 + 1e-12)));
         }
         if let Some(side) = at.side {
             // 1, and 2 for the feet of centre and corners.
+            let told = told.map(|v| side.sign() * v);
             let distances = corners.map(|corner| corner.value.abs());
             let (least, square) = (ends(&distances).0, spread(&distances, size.x));
             let below = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
-            let reach = |foot: DVec3| (0..8).map(|j| (corners[j].point - foot).length() - distances[j]).fold(0.0, f64::max);
-            let above = corners.iter().map(|corner| reach(corner.foot)).fold(reach(at.center.foot), f64::min);
-            known = known.intersection(signed(side, Interval { lower: -below, upper: above }).plus(rounding));
+            let difference = ends(&std::array::from_fn(|j| distances[j] - told[j])).0;
+            let feet: [DVec3; 9] = std::array::from_fn(|k| if k < 8 { corners[k].foot } else { at.center.unwrap_or(corners[0].foot) });
+            let above = mixed(&reach(&corners.map(|corner| corner.point), &feet, &told), limit);
+            known = known.intersection(signed(side, Interval { lower: difference - below, upper: above }));
         }
-        known.widen(self.slack(at))
+        known.widen(self.slack(&at.cell))
     }
 
     /// Sharpens `known` by the triangles of the list, until it is within `limit`. Also returns how fast the distance less
@@ -111,7 +124,7 @@ impl<'a> Prover<'a> {
             && at.corners.iter().all(|corner| corner.certain)
             && let Some((found, found_turn)) = self.by_planes(at)
         {
-            known = known.intersection(found.widen(self.slack(at)));
+            known = known.intersection(found.widen(self.slack(&at.cell)));
             turn = found_turn;
             if known.upper.max(-known.lower) <= limit {
                 return (known, turn);
@@ -120,7 +133,7 @@ impl<'a> Prover<'a> {
         match at.side {
             Some(side) if at.list.len() <= SHORT && !at.list.is_empty() => {
                 let told = at.told.map(|v| side.sign() * v);
-                (known.intersection(signed(side, self.by_triangles(at, &told)).widen(self.slack(at))), turn)
+                (known.intersection(signed(side, self.by_triangles(at, &told)).widen(self.slack(&at.cell))), turn)
             }
             _ => (known, turn),
         }
@@ -128,7 +141,7 @@ impl<'a> Prover<'a> {
 
     /// 5: contains the distance minus what is told, which differ by what `differences` hold at samples `spacing` apart.
     pub fn by_samples(&self, at: &At<'_>, differences: Interval, spacing: f64, turn: f64) -> Interval {
-        differences.widen(turn * 0.75f64.sqrt() * spacing * (1.0 + 1e-12) + self.slack(at))
+        differences.widen(turn * 0.75f64.sqrt() * spacing * (1.0 + 1e-12) + self.slack(&at.cell))
     }
 
     /// 2 and 3: contains the unsigned distance minus the interpolation of `told`.
@@ -195,12 +208,64 @@ impl<'a> Prover<'a> {
     }
 
     /// Rounding of lengths within the cell and the surface.
-    fn slack(&self, at: &At<'_>) -> f64 {
+    fn slack(&self, cell: &Aabb) -> f64 {
         let tree = self.surface.tree();
         // A normal of the flattest triangle that is relied on is off by 1e-9; a cell's list may reach across the surface.
-        let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(at.cell.min.abs()).max(at.cell.max.abs()).max_element();
-        128.0 * f64::EPSILON * reach + 1e-9 * at.cell.radius()
+        let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(cell.min.abs()).max(cell.max.abs()).max_element();
+        128.0 * f64::EPSILON * reach + 1e-9 * cell.radius()
     }
+}
+
+/// How often a better mean is looked for.
+const ROUNDS: usize = 8;
+
+/// How much farther than what is told the corners are from each of the feet.
+fn reach(corners: &[DVec3; 8], feet: &[DVec3; 9], told: &[f64; 8]) -> [[f64; 8]; 9] {
+    let mut rows = [[0.0; 8]; 9];
+    for (row, foot) in rows.iter_mut().zip(feet) {
+        for lane in 0..8 {
+            let (x, y, z) = (corners[lane].x - foot.x, corners[lane].y - foot.y, corners[lane].z - foot.z);
+            row[lane] = (x * x + y * y + z * z).sqrt() - told[lane];
+        }
+    }
+    rows
+}
+
+/// The largest number of a mean of the rows, whose weights are chosen so that it is small; stops at `limit`.
+///
+/// Whatever the weights are, the mean bounds what each of the rows bounds. From the row whose largest number is the least on:
+/// where it is largest, another row is smallest; of both as much as makes the largest numbers equal.
+fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
+    let largest = |row: &[f64; 8]| (1..8).fold((0, row[0]), |(at, high), j| if row[j] > high { (j, row[j]) } else { (at, high) });
+    let Some(mut mean) = rows.iter().copied().min_by(|a, b| largest(a).1.total_cmp(&largest(b).1)) else { return f64::INFINITY };
+    let (mut at, mut high) = largest(&mean);
+    for _ in 0..ROUNDS {
+        if high <= limit {
+            break;
+        }
+        let Some(other) = rows.iter().min_by(|a, b| a[at].total_cmp(&b[at])) else { break };
+        let fall = high - other[at];
+        if !(fall > 0.0) {
+            break;
+        }
+        let mut rival = largest(other).0;
+        let mut better = None;
+        for _ in 0..3 {
+            let weight = ((high - mean[rival]) / (fall + other[rival] - mean[rival])).clamp(0.0, 1.0);
+            let mixed: [f64; 8] = std::array::from_fn(|j| mean[j] + weight * (other[j] - mean[j]));
+            let (worst, value) = largest(&mixed);
+            if value < high && better.is_none_or(|(_, _, least)| value < least) {
+                better = Some((mixed, worst, value));
+            }
+            if worst == at || worst == rival {
+                break;
+            }
+            rival = worst;
+        }
+        let Some(found) = better else { break };
+        (mean, at, high) = found;
+    }
+    high
 }
 
 /// At least |p|^2 less its interpolation, less what the interpolation of the squared distances is above the square of theirs.

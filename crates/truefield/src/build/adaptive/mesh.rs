@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::facets::{At, Corner, Prover};
+use super::halves::{CENTER, Halves, INNER, blend, of_part, steps};
 use super::{Rule, Rules};
 use crate::build::sides::nearest;
 use crate::bvh::Candidate;
@@ -39,8 +40,11 @@ const LISTED: usize = 128;
 /// the parts.
 const FAR: f64 = 3.0;
 
-/// How many times a cell is divided in thought to prove it, before it is divided.
-const AHEAD: u32 = 1;
+/// Points are looked for in lists up to this length, and in the tree where they are longer.
+const SEARCHED: usize = 32;
+
+/// What no number is in.
+const NOTHING: Interval = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
 
 /// Memory is looked at each time a tile has so many cells more.
 const COUNTED: usize = 4096;
@@ -87,7 +91,8 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let blocks = Block::tiles(&lattice, edge);
     let parts = run.blocks("build the tree", blocks.len(), |number| {
         let mut builder = Builder::new(&job);
-        builder.divide(&Start { low: blocks[number].low, edge, near: Slot(0), side: None, range: Range::ALL }, None, run)?;
+        let start = builder.start(blocks[number].low, edge);
+        builder.divide(start, None, run)?;
         Ok(builder.cells)
     })?;
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
@@ -132,38 +137,40 @@ struct Start {
     low: [i64; 3],
     /// In lattice cells.
     edge: i64,
-    /// A triangle that may be near.
-    near: Slot,
+    corners: [Corner; 8],
     /// The side of all its points, where that is known.
     side: Option<Side>,
     /// Of unsigned distances in it.
     range: Range,
 }
 
+/// Lattice indices of a corner of the cell from `low` on.
+fn place(low: [i64; 3], edge: i64, corner: usize) -> [i64; 3] {
+    [0, 1, 2].map(|axis| low[axis] + (corner >> axis & 1) as i64 * edge)
+}
+
 impl Start {
-    /// Lattice index of a corner of the cell, if its edge were `edge`.
-    fn corner(&self, edge: i64, octant: usize) -> [i64; 3] {
-        [0, 1, 2].map(|axis| self.low[axis] + (octant >> axis & 1) as i64 * edge)
+    fn cell(&self, lattice: &Grid) -> Aabb {
+        let at = |corner| {
+            let [x, y, z] = place(self.low, self.edge, corner);
+            lattice.corner(x, y, z)
+        };
+        Aabb::new(at(0), at(7))
     }
 
     /// One of eight parts, of which all that is known holds.
-    fn part(&self, octant: usize) -> Self {
+    fn part(&self, octant: usize, corners: [Corner; 8]) -> Self {
         let half = self.edge / 2;
-        Self { low: self.corner(half, octant), edge: half, ..*self }
+        Self { low: place(self.low, half, octant), edge: half, corners, ..*self }
+    }
+
+    fn parts(&self, lattice: &Grid) -> [Aabb; OCTANTS] {
+        std::array::from_fn(|octant| self.part(octant, self.corners).cell(lattice))
     }
 
     /// With what else is known of its range.
     fn within(self, range: Range) -> Self {
         Self { range: Range { lower: self.range.lower.max(range.lower), upper: self.range.upper.min(range.upper) }, ..self }
-    }
-
-    fn cell(&self, lattice: &Grid) -> Aabb {
-        let place = |[x, y, z]: [i64; 3]| lattice.corner(x, y, z);
-        Aabb::new(place(self.low), place(self.corner(self.edge, 7)))
-    }
-
-    fn parts(&self, lattice: &Grid) -> [Aabb; OCTANTS] {
-        std::array::from_fn(|octant| self.part(octant).cell(lattice))
     }
 }
 
@@ -171,15 +178,16 @@ impl Start {
 struct Look {
     cell: Aabb,
     radius: f64,
-    center: Corner,
-    corners: [Corner; 8],
+    /// Of cells that can be divided.
+    center: Option<Corner>,
 }
 
-/// The interpolation of eight numbers at a corner of an octant.
-fn blend(told: &[f64; 8], octant: usize, corner: usize) -> f64 {
-    let half = |axis: usize| (octant >> axis & 1) + (corner >> axis & 1);
-    let weight = |axis: usize, side: usize| [[2.0, 0.0], [1.0, 1.0], [0.0, 2.0]][half(axis)][side];
-    (0..8).map(|j| told[j] * weight(0, j & 1) * weight(1, j >> 1 & 1) * weight(2, j >> 2)).sum::<f64>() / 8.0
+/// What is proven of a cell that has been looked at more closely.
+struct Proof {
+    /// Contains the distance minus what is told.
+    known: Interval,
+    /// Of each part.
+    parts: [Interval; OCTANTS],
 }
 
 /// The cells of one tile.
@@ -199,53 +207,123 @@ impl<'a> Builder<'a> {
         Self { job, prover, corners: HashMap::default(), cells: Vec::new(), scratch: Scratch::default(), lists: Vec::new() }
     }
 
-    /// Looks at a cell: its range, its side and its corners. `list` is complete, or empty where there is none.
-    fn look(&mut self, start: &Start, list: &[Slot]) -> (Start, Look) {
+    /// The cell of a tile.
+    fn start(&mut self, low: [i64; 3], edge: i64) -> Start {
+        let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], &[], None));
+        Start { low, edge, corners, side: None, range: Range::ALL }
+    }
+
+    /// Looks at a cell: its range, its side and its centre. `list` is complete, or empty where there is none.
+    fn look(&mut self, start: Start, list: &[Slot]) -> (Start, Look) {
         let Job { surface, lattice, .. } = *self.job;
         let cell = start.cell(lattice);
         let radius = cell.radius() * (1.0 + 1e-12);
-        // The centre tells the range; it is a corner of the parts.
-        let middle = start.corner(start.edge / 2, 7);
-        let center = if start.edge > 1 { self.corner(middle, list, start) } else { corner(surface, cell.center(), list, start) };
-        let far = center.value.abs();
-        let range = Range { lower: start.range.lower.max(far - radius), upper: start.range.upper.min(far + radius) };
-        let clear = || if range.lower > 0.0 { side_of(surface, &cell, &center) } else { None };
-        let start = Start { near: center.near, side: start.side.or_else(clear), range, ..*start };
-        let corners = std::array::from_fn(|octant| self.corner(start.corner(start.edge, octant), list, &start));
-        (start, Look { cell, radius, center, corners })
+        let mut start = Start { ..start }.within(self.prover.range(&cell, &start.corners));
+        let parted = surface.side_changes_at_surface_only();
+        let center = if start.edge > 1 {
+            // It is a corner of the parts.
+            Some(self.corner(place(start.low, start.edge / 2, 7), list, &start.corners, start.side))
+        } else {
+            let alone = !parted && start.side.is_none() && start.range.lower > 0.0;
+            alone.then(|| corner(surface, cell.center(), list, &start.corners, None))
+        };
+        if let Some(center) = center {
+            let far = center.value.abs();
+            start = start.within(Range { lower: far - radius, upper: far + radius });
+        }
+        if start.side.is_none() && start.range.lower > 0.0 {
+            start.side = match center {
+                _ if parted => one_side(&start.corners),
+                Some(center) => side_of_ball(surface, &center, radius),
+                None => None,
+            };
+        }
+        (start, Look { cell, radius, center })
     }
 
-    /// Contains the distance minus the interpolation of `told`, in a cell or a part of one; as sharp as it takes to be within
-    /// `limit`, if it can be. `ahead` is how many times the cell may be divided to prove it.
-    fn prove(&mut self, start: &Start, look: &Look, told: [f64; 8], list: &[Slot], limit: f64, ahead: u32) -> Interval {
-        let Look { cell, center, corners, .. } = *look;
-        let at = At { cell, range: start.range, side: start.side, corners, center, told, list };
+    /// Asks for the corners of the parts of a cell; stops, with false, at one whose side is certain that is farther than
+    /// `limit` from what is told.
+    fn sample(&mut self, start: &Start, halves: &mut Halves, told: &[f64; 27], list: &[Slot], limit: f64) -> bool {
+        for number in INNER {
+            let found = match halves.0[number] {
+                Some(found) => found,
+                None => {
+                    let [x, y, z] = steps(number).map(|step| step * (start.edge / 2));
+                    let found = self.corner([start.low[0] + x, start.low[1] + y, start.low[2] + z], list, &start.corners, start.side);
+                    *halves.0[number].insert(found)
+                }
+            };
+            if found.certain && (found.value - told[number]).abs() > limit {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// Proves the parts of a cell one by one by their corners.
+    fn prove_parts(&self, start: &Start, halves: &Halves, told: &[f64; 27], limit: f64) -> Proof {
+        let Job { surface, lattice, .. } = *self.job;
+        let mut proof = Proof { known: NOTHING, parts: [Interval::ALL; OCTANTS] };
+        for octant in 0..OCTANTS {
+            if let Some(corners) = halves.corners(octant) {
+                let start = start.part(octant, corners);
+                let cell = start.cell(lattice);
+                let Start { side, range, .. } = start.within(self.prover.range(&cell, &corners));
+                let clear = side.is_none() && range.lower > 0.0 && surface.side_changes_at_surface_only();
+                let side = if clear { one_side(&corners) } else { side };
+                let told = of_part(told, octant);
+                proof.parts[octant] = self.prover.coarse(&At { cell, range, side, corners, center: None, told, list: &[] }, limit);
+            }
+            proof.known = proof.known.hull(proof.parts[octant]);
+        }
+        proof
+    }
+
+    /// Sharpens what is proven of a cell by its complete list, until it is within `limit`.
+    fn prove_by_list(
+        &mut self,
+        start: &Start,
+        look: &Look,
+        told: [f64; 8],
+        list: &[Slot],
+        limit: f64,
+        halves: Option<(&Halves, &[f64; 27], Proof)>,
+        known: Interval,
+    ) -> Interval {
         let within = |error: Interval| error.upper <= limit && error.lower >= -limit;
-        let known = self.prover.coarse(&at);
-        if within(known) || list.is_empty() {
-            return known;
-        }
+        let center = look.center.map(|center| center.foot);
+        let at = At { cell: look.cell, range: start.range, side: start.side, corners: start.corners, center, told, list };
         let (mut known, turn) = self.prover.fine(&at, known, limit);
-        if within(known) || ahead == 0 || start.edge == 1 {
+        let Some((halves, told, proof)) = halves else { return known };
+        if within(known) {
             return known;
         }
-        // A sample that is too far off ends the hope, and is a corner of the children that there will be.
-        let Some(differences) = self.sample(start, &told, list, limit) else { return known };
         if turn < 1.0 {
-            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * cell.size().x, turn));
+            let differences = halves.0.iter().zip(told).filter_map(|(found, told)| Some(Interval::exact((*found)?.value - told)));
+            let differences = differences.fold(NOTHING, Interval::hull);
+            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * look.cell.size().x, turn));
             if within(known) {
                 return known;
             }
         }
         let mut lists = self.lists.pop().unwrap_or_default();
         let ranges = refine(self.job.surface.tree(), &start.parts(self.job.lattice), list, &mut self.scratch, &mut lists);
-        let mut whole = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
+        let mut whole = NOTHING;
         for octant in 0..OCTANTS {
-            let (start, look) = self.look(&start.part(octant).within(ranges[octant]), &lists[octant]);
-            let part =
-                self.prove(&start, &look, std::array::from_fn(|corner| blend(&told, octant, corner)), &lists[octant], limit, ahead - 1);
+            let mut part = proof.parts[octant];
+            if !within(part)
+                && let Some(corners) = halves.corners(octant)
+            {
+                let start = start.part(octant, corners).within(ranges[octant]);
+                let cell = start.cell(self.job.lattice);
+                let clear = start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only();
+                let side = if clear { one_side(&corners) } else { start.side };
+                let told = of_part(told, octant);
+                let at = At { cell, range: start.range, side, corners, center: None, told, list: &lists[octant] };
+                part = part.intersection(self.prover.fine(&at, part, limit).0);
+            }
             whole = whole.hull(part);
-            if !within(part) {
+            if !within(part) && self.job.rules.rule == Rule::Verified {
                 whole = Interval::ALL;
                 break;
             }
@@ -254,60 +332,51 @@ impl<'a> Builder<'a> {
         known.intersection(whole)
     }
 
-    /// Contains the distance minus the interpolation of `told` at the corners of the eight parts; `None` where it is beyond
-    /// `limit` at any whose side is certain.
-    fn sample(&mut self, start: &Start, told: &[f64; 8], list: &[Slot], limit: f64) -> Option<Interval> {
-        let mut differences = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
-        for octant in 0..OCTANTS {
-            let part = start.part(octant);
-            for corner in 0..8 {
-                let found = self.corner(part.corner(part.edge, corner), list, start);
-                let difference = found.value - blend(told, octant, corner);
-                if found.certain && difference.abs() > limit {
-                    return None;
-                }
-                differences = differences.hull(Interval::exact(difference));
-            }
-        }
-        Some(differences)
-    }
-
     /// Judges a cell and, where it is a branch, its parts. `list` is complete, where there is one.
-    fn divide(&mut self, start: &Start, list: Option<&[Slot]>, run: &Run<'_>) -> Result<()> {
-        let Job { surface, lattice, depth, rules, .. } = *self.job;
+    fn divide(&mut self, start: Start, list: Option<&[Slot]>, run: &Run<'_>) -> Result<()> {
+        let Job { surface, lattice, depth, rules, leaves, .. } = *self.job;
         let (scale, tree) = (surface.scale(), surface.tree());
         let (start, look) = self.look(start, list.unwrap_or(&[]));
         let Start { low, edge, range, .. } = start;
-        let values = look.corners.map(|corner| (corner.value / scale) as f32);
+        let values = start.corners.map(|corner| (corner.value / scale) as f32);
         let told = values.map(|v| f64::from(v) * scale);
         let limit = rules.allowed(range.lower / scale) * scale;
         let within = |error: Interval| error.upper <= limit && error.lower >= -limit;
-        let mut known = self.prove(&start, &look, told, &[], limit, 0);
-        let middle = told.iter().sum::<f64>() / 8.0;
-        let hopeless = edge > 1 && look.center.certain && (look.center.value - middle).abs() > limit;
-        let done = self.job.leaves == Leaves::Linear && (within(known) || hopeless);
+        let center = look.center.map(|center| center.foot);
+        let at = At { cell: look.cell, range, side: start.side, corners: start.corners, center, told, list: &[] };
+        let mut known = self.prover.coarse(&at, limit);
+        let mut halves = Halves::new(&start.corners);
+        halves.0[CENTER] = look.center;
+        // A sample that is too far off ends the hope.
+        let (mut close, mut proof) = (true, None);
+        let blended = blend(&told);
+        if leaves == Leaves::Linear && edge > 1 && !within(known) {
+            close = self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), limit);
+            if close {
+                let found = self.prove_parts(&start, &halves, &blended, limit);
+                known = known.intersection(found.known);
+                proof = Some(found);
+            }
+        }
+        let done = leaves == Leaves::Linear && (within(known) || !close);
         // Triangles are looked at where they can still tell something.
         let mut own = Vec::new();
-        let listed = list.is_some() || !done && gather_few(tree, &look.cell, look.center.foot, LISTED, &mut self.scratch, &mut own);
+        let witness = center.unwrap_or(start.corners[0].foot);
+        let listed = list.is_some() || !done && gather_few(tree, &look.cell, witness, LISTED, &mut self.scratch, &mut own);
         let list = list.or_else(|| listed.then_some(own.as_slice()));
-        let leaf = match (self.job.leaves, list) {
-            (Leaves::Exact, _) if edge == 1 || range.lower >= FAR * look.radius => true,
-            (Leaves::Exact, list) => list.is_some_and(|list| list.len() <= LIST),
-            (Leaves::Linear, list) if !done && rules.rule == Rule::Samples => {
-                let list = list.unwrap_or(&[]);
-                let enough = edge == 1 || self.sample(&start, &told, list, limit).is_some();
-                if enough {
-                    known = known.intersection(self.prove(&start, &look, told, list, 0.0, 1));
-                }
-                enough
-            }
-            (Leaves::Linear, Some(list)) if !done => {
-                known = self.prove(&start, &look, told, list, if edge > 1 { limit } else { 0.0 }, AHEAD);
-                edge == 1 || within(known)
-            }
-            (Leaves::Linear, _) => edge == 1 || within(known),
+        if !done
+            && leaves == Leaves::Linear
+            && let Some(list) = list
+        {
+            let halves = proof.map(|proof| (&halves, &blended, proof));
+            known = self.prove_by_list(&start, &look, told, list, limit, halves, known);
+        }
+        let leaf = match (leaves, list) {
+            _ if edge == 1 => true,
+            (Leaves::Exact, list) => range.lower >= FAR * look.radius || list.is_some_and(|list| list.len() <= LIST),
+            (Leaves::Linear, _) => within(known) || close && rules.rule == Rule::Samples,
         };
-        let kind = match (leaf, self.job.leaves) {
+        let kind = match (leaf, leaves) {
             (false, _) => LevelKind::Branch,
             (true, Leaves::Linear) => LevelKind::Linear,
             (true, Leaves::Exact) => LevelKind::Exact,
@@ -328,23 +397,26 @@ impl<'a> Builder<'a> {
         if leaf {
             return Ok(());
         }
-        let Some(list) = list else {
-            return (0..OCTANTS).try_for_each(|octant| self.divide(&start.part(octant), None, run));
+        self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), f64::INFINITY);
+        let mut lists = list.map(|_| self.lists.pop().unwrap_or_default());
+        let ranges = match (list, &mut lists) {
+            (Some(list), Some(lists)) => refine(tree, &start.parts(lattice), list, &mut self.scratch, lists),
+            _ => [Range::ALL; OCTANTS],
         };
-        let mut lists = self.lists.pop().unwrap_or_default();
-        let ranges = refine(tree, &start.parts(lattice), list, &mut self.scratch, &mut lists);
         for octant in 0..OCTANTS {
-            self.divide(&start.part(octant).within(ranges[octant]), Some(&lists[octant]), run)?;
+            let Some(corners) = halves.corners(octant) else { continue };
+            let list = lists.as_ref().map(|lists| lists[octant].as_slice());
+            self.divide(start.part(octant, corners).within(ranges[octant]), list, run)?;
         }
-        self.lists.push(lists);
+        self.lists.extend(lists);
         Ok(())
     }
 
-    /// A lattice point of a cell, in the tree's units.
-    fn corner(&mut self, place: [i64; 3], list: &[Slot], start: &Start) -> Corner {
+    /// A lattice point of a cell, in the tree's units; `near` may be near it.
+    fn corner(&mut self, place: [i64; 3], list: &[Slot], near: &[Corner], side: Option<Side>) -> Corner {
         let key = place.iter().fold(0, |key, &i| key << 21 | i as u64);
         let job = self.job;
-        *self.corners.entry(key).or_insert_with(|| corner(job.surface, job.lattice.corner(place[0], place[1], place[2]), list, start))
+        *self.corners.entry(key).or_insert_with(|| corner(job.surface, job.lattice.corner(place[0], place[1], place[2]), list, near, side))
     }
 
     /// An inner cell above the tiles.
@@ -354,25 +426,26 @@ impl<'a> Builder<'a> {
         let values = std::array::from_fn(|octant| {
             let place = [0, 1, 2].map(|axis| (i64::from(index[axis]) + (octant >> axis & 1) as i64) * edge);
             let p = lattice.corner(place[0], place[1], place[2]);
-            let start = Start { low: place, edge, near: Slot(0), side: None, range: Range::ALL };
-            (corner(surface, p, &[], &start).value / surface.scale()) as f32
+            (corner(surface, p, &[], &[], None).value / surface.scale()) as f32
         });
         let record = Record::new(values, Interval::ALL);
         Node { depth, place: along_curve(index), kind: LevelKind::Branch, record, list: (ListSide::Asked, Box::default()) }
     }
 }
 
-/// The nearest point of the surface and the side of a point of a cell, in the tree's units.
-fn corner(surface: &Surface, p: DVec3, list: &[Slot], start: &Start) -> Corner {
+/// The nearest point of the surface and the side of a point of a cell, in the tree's units. `near` are points that may be
+/// near it, and `list` is complete, or empty where there is none.
+fn corner(surface: &Surface, p: DVec3, list: &[Slot], near: &[Corner], side: Option<Side>) -> Corner {
     let tree = surface.tree();
-    let found = if list.is_empty() {
-        let hint = Candidate { distance_squared: tree.facet_at(start.near).distance_squared(p), triangle: tree.triangle(start.near) };
-        tree.nearest(p, hint)
+    let found = if list.is_empty() || list.len() > SEARCHED {
+        let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
+        let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
+        tree.nearest(p, Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) })
     } else {
         nearest(tree, list, p)
     };
     let foot = tree.facet(found.triangle).nearest(p);
-    let side = start.side.unwrap_or_else(|| surface.side(p, &foot, found.triangle));
+    let side = side.unwrap_or_else(|| surface.side(p, &foot, found.triangle));
     Corner {
         value: side.sign() * foot.distance_squared.sqrt(),
         certain: side.is_certain(),
@@ -382,14 +455,16 @@ fn corner(surface: &Surface, p: DVec3, list: &[Slot], start: &Start) -> Corner {
     }
 }
 
-/// The one side of a cell that the surface does not touch, if that is certain.
-fn side_of(surface: &Surface, cell: &Aabb, center: &Corner) -> Option<Side> {
-    if surface.side_changes_at_surface_only() {
-        let side = if center.value < 0.0 { Side::Inside } else { Side::Outside };
-        return center.certain.then_some(side);
-    }
+/// The one side of a cell that the surface does not touch, where the side changes at the surface only.
+fn one_side(corners: &[Corner; 8]) -> Option<Side> {
+    let certain = corners.iter().find(|corner| corner.certain)?;
+    Some(if certain.value < 0.0 { Side::Inside } else { Side::Outside })
+}
+
+/// The one side of a ball that the surface does not touch, if that is certain.
+fn side_of_ball(surface: &Surface, center: &Corner, radius: f64) -> Option<Side> {
     let triangle = surface.tree().triangle(center.near);
-    surface.side_of_ball(center.point, &surface.tree().facet(triangle).nearest(center.point), triangle, cell.radius())
+    surface.side_of_ball(center.point, &surface.tree().facet(triangle).nearest(center.point), triangle, radius)
 }
 
 fn list_side(side: Option<Side>) -> ListSide {

@@ -6,6 +6,7 @@
 
 mod coalesce;
 mod facets;
+mod halves;
 mod mesh;
 pub(crate) mod verify;
 
