@@ -9,16 +9,19 @@
 //!    some corners, and the other q at the rest, u - I is at most p q / (p + q); see `mixed`.
 //! 3. u is one of the d(T), each of which lies above its tangent at the cell's centre: u - I is at least the least over T
 //!    of the least (tangent - u) at the corners.
-//! 4. Near a sound piece of surface, signed: let all normals n of the list be within a of their mean, and q, on triangle T,
-//!    be nearest to p. The triangles around q lead away in all directions, none of them nearer to p, so p - q is within a
-//!    of the mean, up or down, and |p - q| lies between n.(p - q) and n.(p - q) / cos 2a.
-//! 5. There the gradient of the distance is within a of the mean m, so that the distance less m.p changes by at most
-//!    sqrt(2 - 2 cos a) times as much as one moves, and between samples it is that much nearer to their interpolation,
-//!    which is exact for m.p.
+//! 4. Near a sound piece of surface, signed: let all normals n of the list be within a of their mean m. Seen along m the
+//!    surface around q, which is nearest to p, is a graph of slopes g(n); it touches the plane across p - q there and
+//!    stays on one side, so that the plane's slope is a mean of the g (0 is in Clarke's subdifferential at a largest
+//!    value): p - q points along a mean of the normals around q, up or down, and is within a of m. Of these normals one at
+//!    least, of a triangle of the list, has n.(p - q) of at least |p - q| cos a in size; it is |p - q| at most.
+//! 5. There the gradient of the distance is within a of m, so within sin a of m cos a: the distance less an affine function
+//!    changes by at most sin a times as much as one moves, and between samples it is that much nearer to their
+//!    interpolation, which is exact for affine functions.
 
 use crate::bvh::cover::Range;
 use crate::bvh::tree::Slot;
 use crate::geom::{Aabb, DVec3, Interval};
+use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
 /// Longer lists are not looked through triangle by triangle.
@@ -26,6 +29,9 @@ const SHORT: usize = 32;
 
 /// Longer lists are not looked through plane by plane.
 const PLANES: usize = 128;
+
+/// Normals whose cosine with their mean is less are not relied on.
+const STEEPEST: f64 = 0.1;
 
 /// Triangles flatter than this have no normal to rely on.
 const FLAT: f64 = 1e-6;
@@ -63,17 +69,39 @@ pub(super) struct At<'a> {
 /// Proves cells of one surface; all lengths are in the tree's units.
 pub(super) struct Prover<'a> {
     surface: &'a Surface,
+    planes: &'a [Plane],
 }
 
-/// A plane and how far from the corners it lies.
-struct Plane {
+/// The plane of a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plane {
     normal: DVec3,
-    heights: [f64; 8],
+    point: DVec3,
+    /// One over the triangle's least height; infinite where there is no normal to rely on.
+    flat: f64,
+    /// What keeps its edges from meeting its neighbours', where the surface is whole around it whatever is near.
+    apart: Option<f64>,
+}
+
+impl Plane {
+    /// Those of all triangles, by slot.
+    pub fn all(surface: &Surface) -> Vec<Self> {
+        let tree = surface.tree();
+        let plane = |slot: u32| {
+            let facet = tree.facet_at(Slot(slot));
+            let cross = facet.ab.cross(facet.ac);
+            let longest = facet.ab.length_squared().max(facet.ac.length_squared()).max((facet.ac - facet.ab).length_squared()).sqrt();
+            let height = cross.length() / longest;
+            let flat = if height > FLAT * longest { 1.0 / height } else { f64::INFINITY };
+            Self { normal: cross / cross.length(), point: facet.a, flat, apart: surface.whole(tree.triangle(Slot(slot)), f64::MAX) }
+        };
+        (0..tree.len() as u32).map(plane).collect()
+    }
 }
 
 impl<'a> Prover<'a> {
-    pub fn new(surface: &'a Surface) -> Self {
-        Self { surface }
+    pub fn new(surface: &'a Surface, planes: &'a [Plane]) -> Self {
+        Self { surface, planes }
     }
 
     /// Unsigned distances in a cell, by its corners: by 1, or as far as one moves.
@@ -110,7 +138,7 @@ impl<'a> Prover<'a> {
             let below = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
             let difference = ends(&std::array::from_fn(|j| distances[j] - told[j])).0;
             let feet: [DVec3; 9] = std::array::from_fn(|k| if k < 8 { corners[k].foot } else { at.center.unwrap_or(corners[0].foot) });
-            let above = mixed(&reach(&corners.map(|corner| corner.point), &feet, &told), limit);
+            let above = above_feet(corners, &feet, &told, limit);
             known = known.intersection(signed(side, Interval { lower: difference - below, upper: above }));
         }
         known.widen(self.slack(&at.cell))
@@ -133,7 +161,7 @@ impl<'a> Prover<'a> {
         match at.side {
             Some(side) if at.list.len() <= SHORT && !at.list.is_empty() => {
                 let told = at.told.map(|v| side.sign() * v);
-                (known.intersection(signed(side, self.by_triangles(at, &told)).widen(self.slack(&at.cell))), turn)
+                (known.intersection(signed(side, self.by_triangles(at, &told, limit)).widen(self.slack(&at.cell))), turn)
             }
             _ => (known, turn),
         }
@@ -144,67 +172,50 @@ impl<'a> Prover<'a> {
         differences.widen(turn * 0.75f64.sqrt() * spacing * (1.0 + 1e-12) + self.slack(&at.cell))
     }
 
-    /// 2 and 3: contains the unsigned distance minus the interpolation of `told`.
-    fn by_triangles(&self, at: &At<'_>, told: &[f64; 8]) -> Interval {
+    /// 2 and 3: contains the unsigned distance minus the interpolation of `told`; from above no sharper than `limit`.
+    fn by_triangles(&self, at: &At<'_>, told: &[f64; 8], limit: f64) -> Interval {
         let tree = self.surface.tree();
         let center = at.cell.center();
         let places: [DVec3; 8] = std::array::from_fn(|j| at.cell.corner(j));
-        let mut found = Interval { lower: f64::INFINITY, upper: f64::INFINITY };
-        for &slot in at.list {
+        let mut lower = f64::INFINITY;
+        let mut rows = [[0.0; 8]; SHORT];
+        for (&slot, row) in at.list.iter().zip(&mut rows) {
             let facet = tree.facet_at(slot);
-            let above = (0..8).map(|j| facet.distance_squared(places[j]).sqrt() - told[j]).fold(f64::NEG_INFINITY, f64::max);
+            *row = std::array::from_fn(|j| facet.distance_squared(places[j]).sqrt() - told[j]);
             let foot = facet.nearest(center);
             let distance = foot.distance_squared.sqrt();
             let slope = (center - foot.point) / distance;
             // On the triangle there is no tangent; zero is below.
             let (base, slope) = if distance > 0.0 { (distance, slope) } else { (0.0, DVec3::ZERO) };
-            let below = (0..8).map(|j| base + slope.dot(places[j] - center) - told[j]).fold(f64::INFINITY, f64::min);
-            found = Interval { lower: found.lower.min(below), upper: found.upper.min(above) };
+            lower = (0..8).map(|j| base + slope.dot(places[j] - center) - told[j]).fold(lower, f64::min);
         }
-        found
+        Interval { lower, upper: mixed(&rows[..at.list.len()], limit) }
     }
 
-    /// 4 and 5: contains the signed distance minus the interpolation, and how fast its direction leaves the mean; `None`
+    /// 4 and 5: contains the signed distance minus the interpolation, and how fast it can leave an affine function; `None`
     /// where the surface is not known to be sound.
     fn by_planes(&self, at: &At<'_>) -> Option<(Interval, f64)> {
         let (mut mean, mut turned) = (DVec3::ZERO, 0.0f64);
-        let (mut found, mut farthest) = (Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY }, 0.0f64);
-        let mut normals = [DVec3::ZERO; PLANES];
-        for (&slot, normal) in at.list.iter().zip(&mut normals) {
-            let (plane, apart) = self.plane(at, slot)?;
-            *normal = plane.normal;
-            (mean, turned) = (mean + plane.normal, turned.max(apart));
-            found = found.hull(hull(std::array::from_fn(|j| plane.heights[j] - at.told[j])));
-            farthest = plane.heights.iter().fold(farthest, |far, height| far.max(height.abs()));
+        for &slot in at.list {
+            let plane = &self.planes[slot.0 as usize];
+            let asked = || self.surface.whole(self.surface.tree().triangle(slot), at.range.upper);
+            let angle = plane.apart.or_else(asked)? * plane.flat;
+            if !angle.is_finite() {
+                return None;
+            }
+            (mean, turned) = (mean + plane.normal, turned.max(angle));
         }
         let mean = mean.normalize_or_zero();
-        let cosine = normals[..at.list.len()].iter().map(|normal| normal.dot(mean)).fold(1.0, f64::min);
+        let cosine = at.list.iter().map(|&slot| self.planes[slot.0 as usize].normal.dot(mean)).fold(1.0, f64::min);
         // With room for edges that meet but for rounding.
         let cosine = cosine - 2.0 * turned - 1e-12;
-        if !(cosine > 0.5) {
+        if !(cosine > STEEPEST) {
             return None;
         }
-        let turn = (2.0 - 2.0 * cosine).sqrt();
-        let twice = 2.0 * cosine * cosine - 1.0;
-        let found = if twice > 0.5 { found.widen(farthest * (1.0 / twice - 1.0)) } else { Interval::ALL };
+        let found = between_planes(self.planes, at.list, &at.corners, &at.told, 1.0 / cosine);
+        let turn = (1.0 - cosine * cosine).sqrt();
         let differences = hull(std::array::from_fn(|j| at.corners[j].value - at.told[j]));
         Some((found.intersection(self.by_samples(at, differences, at.cell.size().x, turn)), turn))
-    }
-
-    /// The plane of a triangle around which the surface is whole, and an angle for what keeps its edges from meeting.
-    fn plane(&self, at: &At<'_>, slot: Slot) -> Option<(Plane, f64)> {
-        let tree = self.surface.tree();
-        let facet = tree.facet_at(slot);
-        let apart = self.surface.whole(tree.triangle(slot), at.range.upper)?;
-        let cross = facet.ab.cross(facet.ac);
-        let longest = facet.ab.length_squared().max(facet.ac.length_squared()).max((facet.ac - facet.ab).length_squared()).sqrt();
-        let height = cross.length() / longest;
-        if !(height > FLAT * longest) {
-            return None;
-        }
-        let normal = cross / cross.length();
-        let heights = std::array::from_fn(|j| normal.dot(at.cell.corner(j) - facet.a));
-        Some((Plane { normal, heights }, apart / height))
     }
 
     /// Rounding of lengths within the cell and the surface.
@@ -219,22 +230,56 @@ impl<'a> Prover<'a> {
 /// How often a better mean is looked for.
 const ROUNDS: usize = 8;
 
-/// How much farther than what is told the corners are from each of the feet.
-fn reach(corners: &[DVec3; 8], feet: &[DVec3; 9], told: &[f64; 8]) -> [[f64; 8]; 9] {
+multiversion!(
+    /// No less than the unsigned distance minus the interpolation of what is told, by points of the surface; no sharper than
+    /// `limit`.
+    fn above_feet(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: f64) -> f64 = above_feet_body
+);
+
+#[inline(always)]
+fn above_feet_body<F: Fuse>(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: f64) -> f64 {
     let mut rows = [[0.0; 8]; 9];
+    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].point[axis]) };
+    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
     for (row, foot) in rows.iter_mut().zip(feet) {
         for lane in 0..8 {
-            let (x, y, z) = (corners[lane].x - foot.x, corners[lane].y - foot.y, corners[lane].z - foot.z);
+            let (x, y, z) = (xs[lane] - foot.x, ys[lane] - foot.y, zs[lane] - foot.z);
             row[lane] = (x * x + y * y + z * z).sqrt() - told[lane];
         }
     }
-    rows
+    mixed(&rows, limit)
+}
+
+multiversion!(
+    /// The hull, at the corners, of what lies between the heights above the planes and `stretch` times as much, minus what is
+    /// told. The larger of two multiples of a height is convex, the lesser concave: what they are at corners bounds them.
+    fn between_planes(planes: &[Plane], list: &[Slot], corners: &[Corner; 8], told: &[f64; 8], stretch: f64) -> Interval = between_planes_body
+);
+
+#[inline(always)]
+fn between_planes_body<F: Fuse>(planes: &[Plane], list: &[Slot], corners: &[Corner; 8], told: &[f64; 8], stretch: f64) -> Interval {
+    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].point[axis]) };
+    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
+    let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
+    for &slot in list {
+        let Plane { normal, point, .. } = planes[slot.0 as usize];
+        for lane in 0..8 {
+            let height = normal.x * (xs[lane] - point.x) + normal.y * (ys[lane] - point.y) + normal.z * (zs[lane] - point.z);
+            let most = height * stretch;
+            let (less, more) = if height < most { (height, most) } else { (most, height) };
+            low[lane] = if less < low[lane] { less } else { low[lane] };
+            high[lane] = if more > high[lane] { more } else { high[lane] };
+        }
+    }
+    let (low, high): ([f64; 8], [f64; 8]) = (std::array::from_fn(|j| low[j] - told[j]), std::array::from_fn(|j| high[j] - told[j]));
+    Interval { lower: ends(&low).0, upper: ends(&high).1 }
 }
 
 /// The largest number of a mean of the rows, whose weights are chosen so that it is small; stops at `limit`.
 ///
 /// Whatever the weights are, the mean bounds what each of the rows bounds. From the row whose largest number is the least on:
 /// where it is largest, another row is smallest; of both as much as makes the largest numbers equal.
+#[inline(always)]
 fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
     let largest = |row: &[f64; 8]| (1..8).fold((0, row[0]), |(at, high), j| if row[j] > high { (j, row[j]) } else { (at, high) });
     let Some(mut mean) = rows.iter().copied().min_by(|a, b| largest(a).1.total_cmp(&largest(b).1)) else { return f64::INFINITY };

@@ -5,7 +5,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::facets::{At, Corner, Prover};
+use super::facets::{At, Corner, Plane, Prover};
 use super::halves::{CENTER, Halves, INNER, blend, of_part, steps};
 use super::{Rule, Rules};
 use crate::build::sides::nearest;
@@ -86,7 +86,8 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let scale = surface.scale();
     let lattice =
         Grid { origin: root.extent.min * scale, spacing: edge * scale * (-f64::from(depth)).exp2(), first: [0; 3], shape: [1 << depth; 3] };
-    let job = Job { surface, lattice: &lattice, depth, leaves, rules, cells: AtomicU64::new(0) };
+    let planes = if leaves == Leaves::Linear { Plane::all(surface) } else { Vec::new() };
+    let job = Job { surface, planes: &planes, lattice: &lattice, depth, leaves, rules, cells: AtomicU64::new(0) };
     let edge = 1i64 << (depth - tiles);
     let blocks = Block::tiles(&lattice, edge);
     let parts = run.blocks("build the tree", blocks.len(), |number| {
@@ -113,6 +114,7 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
 /// What all tiles share.
 struct Job<'a> {
     surface: &'a Surface,
+    planes: &'a [Plane],
     lattice: &'a Grid,
     /// Depth of single lattice cells.
     depth: u32,
@@ -174,20 +176,18 @@ impl Start {
     }
 }
 
-/// What is seen of a cell.
-struct Look {
-    cell: Aabb,
-    radius: f64,
-    /// Of cells that can be divided.
-    center: Option<Corner>,
-}
-
 /// What is proven of a cell that has been looked at more closely.
 struct Proof {
     /// Contains the distance minus what is told.
     known: Interval,
     /// Of each part.
     parts: [Interval; OCTANTS],
+}
+
+/// What a list proves of a cell, and the lists and ranges of its parts where they were needed.
+struct Listed {
+    known: Interval,
+    parts: Option<([Vec<Slot>; OCTANTS], [Range; OCTANTS])>,
 }
 
 /// The cells of one tile.
@@ -203,7 +203,7 @@ struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     fn new(job: &'a Job<'a>) -> Self {
-        let prover = Prover::new(job.surface);
+        let prover = Prover::new(job.surface, job.planes);
         Self { job, prover, corners: HashMap::default(), cells: Vec::new(), scratch: Scratch::default(), lists: Vec::new() }
     }
 
@@ -213,32 +213,15 @@ impl<'a> Builder<'a> {
         Start { low, edge, corners, side: None, range: Range::ALL }
     }
 
-    /// Looks at a cell: its range, its side and its centre. `list` is complete, or empty where there is none.
-    fn look(&mut self, start: Start, list: &[Slot]) -> (Start, Look) {
-        let Job { surface, lattice, .. } = *self.job;
-        let cell = start.cell(lattice);
-        let radius = cell.radius() * (1.0 + 1e-12);
-        let mut start = Start { ..start }.within(self.prover.range(&cell, &start.corners));
-        let parted = surface.side_changes_at_surface_only();
-        let center = if start.edge > 1 {
-            // It is a corner of the parts.
-            Some(self.corner(place(start.low, start.edge / 2, 7), list, &start.corners, start.side))
-        } else {
-            let alone = !parted && start.side.is_none() && start.range.lower > 0.0;
-            alone.then(|| corner(surface, cell.center(), list, &start.corners, None))
-        };
-        if let Some(center) = center {
-            let far = center.value.abs();
-            start = start.within(Range { lower: far - radius, upper: far + radius });
+    /// Looks at a cell: its range and its side.
+    fn look(&self, start: Start) -> (Start, Aabb) {
+        let (cell, mut start) = self.part(start);
+        let surface = self.job.surface;
+        if start.side.is_none() && start.range.lower > 0.0 && !surface.side_changes_at_surface_only() {
+            let center = corner(surface, cell.center(), &[], &start.corners, None);
+            start.side = side_of_ball(surface, &center, cell.radius() * (1.0 + 1e-12));
         }
-        if start.side.is_none() && start.range.lower > 0.0 {
-            start.side = match center {
-                _ if parted => one_side(&start.corners),
-                Some(center) => side_of_ball(surface, &center, radius),
-                None => None,
-            };
-        }
-        (start, Look { cell, radius, center })
+        (start, cell)
     }
 
     /// Asks for the corners of the parts of a cell; stops, with false, at one whose side is certain that is farther than
@@ -262,65 +245,52 @@ impl<'a> Builder<'a> {
 
     /// Proves the parts of a cell one by one by their corners.
     fn prove_parts(&self, start: &Start, halves: &Halves, told: &[f64; 27], limit: f64) -> Proof {
-        let Job { surface, lattice, .. } = *self.job;
         let mut proof = Proof { known: NOTHING, parts: [Interval::ALL; OCTANTS] };
         for octant in 0..OCTANTS {
             if let Some(corners) = halves.corners(octant) {
-                let start = start.part(octant, corners);
-                let cell = start.cell(lattice);
-                let Start { side, range, .. } = start.within(self.prover.range(&cell, &corners));
-                let clear = side.is_none() && range.lower > 0.0 && surface.side_changes_at_surface_only();
-                let side = if clear { one_side(&corners) } else { side };
+                let (cell, start) = self.part(start.part(octant, corners));
                 let told = of_part(told, octant);
-                proof.parts[octant] = self.prover.coarse(&At { cell, range, side, corners, center: None, told, list: &[] }, limit);
+                let at = At { cell, range: start.range, side: start.side, corners, center: None, told, list: &[] };
+                proof.parts[octant] = self.prover.coarse(&at, limit);
             }
             proof.known = proof.known.hull(proof.parts[octant]);
         }
         proof
     }
 
-    /// Sharpens what is proven of a cell by its complete list, until it is within `limit`.
+    /// Sharpens what is proven of a cell by its complete list, until it is within `limit`; `parts` are its parts and what is
+    /// proven of them.
     fn prove_by_list(
         &mut self,
         start: &Start,
-        look: &Look,
-        told: [f64; 8],
-        list: &[Slot],
-        limit: f64,
-        halves: Option<(&Halves, &[f64; 27], Proof)>,
+        at: At<'_>,
+        parts: Option<(&Halves, &[f64; 27], Proof)>,
         known: Interval,
-    ) -> Interval {
+        limit: f64,
+    ) -> Listed {
         let within = |error: Interval| error.upper <= limit && error.lower >= -limit;
-        let center = look.center.map(|center| center.foot);
-        let at = At { cell: look.cell, range: start.range, side: start.side, corners: start.corners, center, told, list };
         let (mut known, turn) = self.prover.fine(&at, known, limit);
-        let Some((halves, told, proof)) = halves else { return known };
-        if within(known) {
-            return known;
-        }
-        if turn < 1.0 {
+        let Some((halves, told, proof)) = parts else { return Listed { known, parts: None } };
+        if turn < 1.0 && !within(known) {
             let differences = halves.0.iter().zip(told).filter_map(|(found, told)| Some(Interval::exact((*found)?.value - told)));
             let differences = differences.fold(NOTHING, Interval::hull);
-            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * look.cell.size().x, turn));
-            if within(known) {
-                return known;
-            }
+            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * at.cell.size().x, turn));
+        }
+        if within(known) {
+            return Listed { known, parts: None };
         }
         let mut lists = self.lists.pop().unwrap_or_default();
-        let ranges = refine(self.job.surface.tree(), &start.parts(self.job.lattice), list, &mut self.scratch, &mut lists);
+        let ranges = refine(self.job.surface.tree(), &start.parts(self.job.lattice), at.list, &mut self.scratch, &mut lists);
         let mut whole = NOTHING;
         for octant in 0..OCTANTS {
             let mut part = proof.parts[octant];
             if !within(part)
                 && let Some(corners) = halves.corners(octant)
             {
-                let start = start.part(octant, corners).within(ranges[octant]);
-                let cell = start.cell(self.job.lattice);
-                let clear = start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only();
-                let side = if clear { one_side(&corners) } else { start.side };
+                let (cell, start) = self.part(start.part(octant, corners).within(ranges[octant]));
                 let told = of_part(told, octant);
-                let at = At { cell, range: start.range, side, corners, center: None, told, list: &lists[octant] };
-                part = part.intersection(self.prover.fine(&at, part, limit).0);
+                let at = At { cell, range: start.range, side: start.side, corners, center: None, told, list: &lists[octant] };
+                part = self.prover.fine(&at, part, limit).0;
             }
             whole = whole.hull(part);
             if !within(part) && self.job.rules.rule == Rule::Verified {
@@ -328,53 +298,72 @@ impl<'a> Builder<'a> {
                 break;
             }
         }
-        self.lists.push(lists);
-        known.intersection(whole)
+        Listed { known: known.intersection(whole), parts: Some((lists, ranges)) }
+    }
+
+    /// A part of a cell, and what follows from its corners.
+    fn part(&self, start: Start) -> (Aabb, Start) {
+        let cell = start.cell(self.job.lattice);
+        let range = self.prover.range(&cell, &start.corners);
+        let mut start = start.within(range);
+        if start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only() {
+            start.side = one_side(&start.corners);
+        }
+        (cell, start)
     }
 
     /// Judges a cell and, where it is a branch, its parts. `list` is complete, where there is one.
     fn divide(&mut self, start: Start, list: Option<&[Slot]>, run: &Run<'_>) -> Result<()> {
         let Job { surface, lattice, depth, rules, leaves, .. } = *self.job;
         let (scale, tree) = (surface.scale(), surface.tree());
-        let (start, look) = self.look(start, list.unwrap_or(&[]));
-        let Start { low, edge, range, .. } = start;
-        let values = start.corners.map(|corner| (corner.value / scale) as f32);
+        let (mut start, cell) = self.look(start);
+        let Start { low, edge, corners, .. } = start;
+        let values = corners.map(|corner| (corner.value / scale) as f32);
         let told = values.map(|v| f64::from(v) * scale);
-        let limit = rules.allowed(range.lower / scale) * scale;
-        let within = |error: Interval| error.upper <= limit && error.lower >= -limit;
-        let center = look.center.map(|center| center.foot);
-        let at = At { cell: look.cell, range, side: start.side, corners: start.corners, center, told, list: &[] };
-        let mut known = self.prover.coarse(&at, limit);
-        let mut halves = Halves::new(&start.corners);
-        halves.0[CENTER] = look.center;
+        let blended = blend(&told);
+        let allowed = |range: Range| rules.allowed(range.lower / scale) * scale;
+        let at = |start: &Start, center, list| At { cell, range: start.range, side: start.side, corners, center, told, list };
+        let mut limit = allowed(start.range);
+        let within = |error: Interval, limit: f64| error.upper <= limit && error.lower >= -limit;
+        let mut known = self.prover.coarse(&at(&start, None, &[]), limit);
+        let mut halves = Halves::new(&corners);
+        let linear = leaves == Leaves::Linear;
         // A sample that is too far off ends the hope.
         let (mut close, mut proof) = (true, None);
-        let blended = blend(&told);
-        if leaves == Leaves::Linear && edge > 1 && !within(known) {
-            close = self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), limit);
-            if close {
+        if edge > 1 && !(linear && within(known, limit)) {
+            // The centre, which is a corner of the parts, tells the range.
+            let center = self.corner(place(low, edge / 2, 7), list.unwrap_or(&[]), &corners, start.side);
+            halves.0[CENTER] = Some(center);
+            let (far, radius) = (center.value.abs(), cell.radius() * (1.0 + 1e-12));
+            start = self.look(start.within(Range { lower: far - radius, upper: far + radius })).0;
+            limit = allowed(start.range);
+            close = !linear || self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), limit);
+            if linear && close {
                 let found = self.prove_parts(&start, &halves, &blended, limit);
                 known = known.intersection(found.known);
                 proof = Some(found);
             }
         }
-        let done = leaves == Leaves::Linear && (within(known) || !close);
+        let range = start.range;
+        let center = halves.0[CENTER].map(|center| center.foot);
+        let done = linear && (within(known, limit) || !close);
         // Triangles are looked at where they can still tell something.
         let mut own = Vec::new();
-        let witness = center.unwrap_or(start.corners[0].foot);
-        let listed = list.is_some() || !done && gather_few(tree, &look.cell, witness, LISTED, &mut self.scratch, &mut own);
+        let witness = center.unwrap_or(corners[0].foot);
+        let listed = list.is_some() || !done && gather_few(tree, &cell, witness, LISTED, &mut self.scratch, &mut own);
         let list = list.or_else(|| listed.then_some(own.as_slice()));
+        let mut parts = None;
         if !done
-            && leaves == Leaves::Linear
+            && linear
             && let Some(list) = list
         {
-            let halves = proof.map(|proof| (&halves, &blended, proof));
-            known = self.prove_by_list(&start, &look, told, list, limit, halves, known);
+            let found = self.prove_by_list(&start, at(&start, center, list), proof.map(|proof| (&halves, &blended, proof)), known, limit);
+            (known, parts) = (found.known, found.parts);
         }
         let leaf = match (leaves, list) {
             _ if edge == 1 => true,
-            (Leaves::Exact, list) => range.lower >= FAR * look.radius || list.is_some_and(|list| list.len() <= LIST),
-            (Leaves::Linear, _) => within(known) || close && rules.rule == Rule::Samples,
+            (Leaves::Exact, list) => range.lower >= FAR * cell.radius() || list.is_some_and(|list| list.len() <= LIST),
+            (Leaves::Linear, _) => within(known, limit) || close && rules.rule == Rule::Samples,
         };
         let kind = match (leaf, leaves) {
             (false, _) => LevelKind::Branch,
@@ -395,20 +384,24 @@ impl<'a> Builder<'a> {
             rules.fits(level, cells, cells, f64::from(record.upper.max(-record.lower)))?;
         }
         if leaf {
+            self.lists.extend(parts.map(|(lists, _)| lists));
             return Ok(());
         }
         self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), f64::INFINITY);
-        let mut lists = list.map(|_| self.lists.pop().unwrap_or_default());
-        let ranges = match (list, &mut lists) {
-            (Some(list), Some(lists)) => refine(tree, &start.parts(lattice), list, &mut self.scratch, lists),
-            _ => [Range::ALL; OCTANTS],
-        };
+        if let (Some(list), None) = (list, &parts) {
+            let mut lists = self.lists.pop().unwrap_or_default();
+            let ranges = refine(tree, &start.parts(lattice), list, &mut self.scratch, &mut lists);
+            parts = Some((lists, ranges));
+        }
         for octant in 0..OCTANTS {
             let Some(corners) = halves.corners(octant) else { continue };
-            let list = lists.as_ref().map(|lists| lists[octant].as_slice());
-            self.divide(start.part(octant, corners).within(ranges[octant]), list, run)?;
+            let part = start.part(octant, corners);
+            match &parts {
+                Some((lists, ranges)) => self.divide(part.within(ranges[octant]), Some(&lists[octant]), run)?,
+                None => self.divide(part, None, run)?,
+            }
         }
-        self.lists.extend(lists);
+        self.lists.extend(parts.map(|(lists, _)| lists));
         Ok(())
     }
 
