@@ -59,7 +59,12 @@ impl Tree {
         run: &Run<'_>,
         answer: impl Fn(&[DVec3], &[Candidate]) -> Vec<T> + Sync,
     ) -> Result<Vec<T>> {
-        along_curve("nearest points", points, run, |points, keys| answer(points, &cloud::nearest(self, points, keys)))
+        along_curve("nearest points", points, run, |points, keys| answer(points, &self.nearest_sorted(points, keys)))
+    }
+
+    /// The nearest triangles of points that are sorted by their places on a Morton curve.
+    pub(crate) fn nearest_sorted(&self, points: &[DVec3], keys: &[u32]) -> Vec<Candidate> {
+        cloud::nearest(self, points, keys)
     }
 }
 

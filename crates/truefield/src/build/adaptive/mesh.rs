@@ -180,8 +180,8 @@ impl Start {
 struct Proof {
     /// Contains the distance minus what is told.
     known: Interval,
-    /// Of each part.
-    parts: [Interval; OCTANTS],
+    /// Of each part, as far as the first that fails.
+    parts: [Option<Interval>; OCTANTS],
 }
 
 /// What a list proves of a cell, and the lists and ranges of its parts where they were needed.
@@ -243,19 +243,28 @@ impl<'a> Builder<'a> {
         true
     }
 
-    /// Proves the parts of a cell one by one by their corners.
+    /// Proves the parts of a cell one by one by their corners. Where one fails a cell will be divided, or its list is looked
+    /// at, unless samples are enough.
     fn prove_parts(&self, start: &Start, halves: &Halves, told: &[f64; 27], limit: f64) -> Proof {
-        let mut proof = Proof { known: NOTHING, parts: [Interval::ALL; OCTANTS] };
+        let mut proof = Proof { known: NOTHING, parts: [None; OCTANTS] };
         for octant in 0..OCTANTS {
-            if let Some(corners) = halves.corners(octant) {
-                let (cell, start) = self.part(start.part(octant, corners));
-                let told = of_part(told, octant);
-                let at = At { cell, range: start.range, side: start.side, corners, center: None, told, list: &[] };
-                proof.parts[octant] = self.prover.coarse(&at, limit);
+            let Some(corners) = halves.corners(octant) else { continue };
+            let (cell, start) = self.part(start.part(octant, corners));
+            let at = At { cell, range: start.range, side: start.side, corners, center: None, told: of_part(told, octant), list: &[] };
+            let part = self.prover.coarse(&at, limit);
+            proof.parts[octant] = Some(part);
+            proof.known = proof.known.hull(part);
+            if self.fails(part, limit) {
+                proof.known = Interval::ALL;
+                break;
             }
-            proof.known = proof.known.hull(proof.parts[octant]);
         }
         proof
+    }
+
+    /// Whether a part that is not proven any better decides that the cell is divided.
+    fn fails(&self, part: Interval, limit: f64) -> bool {
+        self.job.rules.rule == Rule::Verified && (part.upper > limit || part.lower < -limit)
     }
 
     /// Sharpens what is proven of a cell by its complete list, until it is within `limit`; `parts` are its parts and what is
@@ -283,17 +292,16 @@ impl<'a> Builder<'a> {
         let ranges = refine(self.job.surface.tree(), &start.parts(self.job.lattice), at.list, &mut self.scratch, &mut lists);
         let mut whole = NOTHING;
         for octant in 0..OCTANTS {
-            let mut part = proof.parts[octant];
-            if !within(part)
-                && let Some(corners) = halves.corners(octant)
-            {
-                let (cell, start) = self.part(start.part(octant, corners).within(ranges[octant]));
-                let told = of_part(told, octant);
-                let at = At { cell, range: start.range, side: start.side, corners, center: None, told, list: &lists[octant] };
+            let Some(corners) = halves.corners(octant) else { continue };
+            let (cell, start) = self.part(start.part(octant, corners).within(ranges[octant]));
+            let told = of_part(told, octant);
+            let at = At { cell, range: start.range, side: start.side, corners, center: None, told, list: &lists[octant] };
+            let mut part = proof.parts[octant].unwrap_or_else(|| self.prover.coarse(&at, limit));
+            if !within(part) {
                 part = self.prover.fine(&at, part, limit).0;
             }
             whole = whole.hull(part);
-            if !within(part) && self.job.rules.rule == Rule::Verified {
+            if self.fails(part, limit) {
                 whole = Interval::ALL;
                 break;
             }

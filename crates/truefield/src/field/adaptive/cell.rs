@@ -118,8 +118,26 @@ impl<'a> Cell<'a> {
         match self.leaf() {
             Leaf::Linear => self.record().value(self.local(p)),
             Leaf::Cubic(samples) => cubic::value(samples, self.local(p)),
-            Leaf::Exact(_) => self.exact(p).map_or(f64::NAN, |(distance, side)| side.sign() * distance),
+            Leaf::Exact(_) => self.exact_value(p, self.nearest(p)),
         }
+    }
+
+    /// What an exact leaf says at a point whose nearest triangle is known.
+    pub(super) fn exact_value(&self, p: DVec3, nearest: Candidate) -> f64 {
+        self.exact(p, nearest).map_or(f64::NAN, |(distance, side)| side.sign() * distance)
+    }
+
+    /// The bounds of an exact leaf at a point whose nearest triangle is known.
+    pub(super) fn exact_bounds(&self, p: DVec3, nearest: Candidate) -> Interval {
+        let known = self.exact(p, nearest).map_or(Interval::ALL, |(distance, side)| {
+            if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
+        });
+        self.age(known, &Aabb::new(p, p))
+    }
+
+    /// Whether it is an exact leaf without a list: its points ask all triangles.
+    pub(super) fn asks_all(&self) -> bool {
+        matches!(self.leaf(), Leaf::Exact([]))
     }
 
     /// The derivative of [`Cell::value`]; its length is near 1.
@@ -136,9 +154,7 @@ impl<'a> Cell<'a> {
     /// Contains the true distance at a point of the cell.
     pub fn bounds(&self, p: DVec3) -> Interval {
         let known = match self.leaf() {
-            Leaf::Exact(_) => self.exact(p).map_or(Interval::ALL, |(distance, side)| {
-                if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
-            }),
+            Leaf::Exact(_) => return self.exact_bounds(p, self.nearest(p)),
             // What a cubic leaf's record says of its interpolation is not what its corners say.
             Leaf::Cubic(samples) => self.error().plus(Interval::exact(cubic::value(samples, self.local(p)))),
             Leaf::Linear => self.error().plus(Interval::exact(self.record().value(self.local(p)))),
@@ -208,11 +224,10 @@ impl<'a> Cell<'a> {
         if self.field.edits.list().is_empty() { known } else { self.field.edits.age(known, part, &self.extent()) }
     }
 
-    /// Unsigned distance and side by the triangles of an exact leaf; `None` where the field has no surface.
-    fn exact(&self, p: DVec3) -> Option<(f64, Side)> {
+    /// Unsigned distance and side by the nearest triangle of an exact leaf's point; `None` where the field has no surface.
+    fn exact(&self, p: DVec3, found: Candidate) -> Option<(f64, Side)> {
         let surface = self.field.surface.as_ref()?;
         let scale = surface.scale();
-        let found = self.nearest(p);
         let side = match self.list_side() {
             ListSide::Inside => Side::Inside,
             ListSide::Outside => Side::Outside,

@@ -11,6 +11,7 @@ mod coarse;
 mod cubic;
 mod edits;
 mod levels;
+mod many;
 mod page;
 
 use std::sync::Arc;
@@ -27,7 +28,7 @@ pub use levels::{Level, LevelKind, Levels};
 pub(crate) use page::{Kind, Page};
 pub use page::{ListSide, Lists, Record, Samples};
 
-use super::each::{each, each_along};
+use super::each::each;
 use crate::distance::Distance;
 use crate::error::Result;
 use crate::field::Continuity;
@@ -222,12 +223,12 @@ impl AdaptiveField {
 
     /// [`AdaptiveField::interpolate`] for many points; not a number outside the domain.
     pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
-        each_along(points, run, |p| self.interpolate(p).unwrap_or(f64::NAN))
+        self.answer(points, run, |p| self.interpolate(p).unwrap_or(f64::NAN), |cell, p, nearest| cell.exact_value(p, nearest))
     }
 
     /// The intervals that contain the true distances, outside the domain too.
     pub fn bounds(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Interval>> {
-        each_along(points, run, |p| self.at(p))
+        self.answer(points, run, |p| self.at(p), |cell, p, nearest| cell.exact_bounds(p, nearest))
     }
 
     /// Unit vectors in which the field grows fastest, zero where it grows nowhere; not numbers outside the domain.
