@@ -6,12 +6,13 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use super::tree::{ABSENT, LEAF, Tree, WIDTH};
+use super::tree::{ABSENT, LEAF, Packet, Tree, WIDTH};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
+use crate::simd::{Fuse, multiversion};
 
 /// Leaves a worker takes at once.
 const BLOCK: usize = 64;
@@ -70,8 +71,12 @@ impl Meetings {
     /// Gaps and slopes are kept in single precision, rounded down; as they are positive, their bits
     /// sort like their values, and the least does not depend on who comes first.
     fn keep(&self, triangle: u32, which: usize, value: f64) {
-        let single = (value as f32).next_down().max(0.0);
-        self.clearance[triangle as usize][which].fetch_min(single.to_bits(), Ordering::Relaxed);
+        let bits = (value as f32).next_down().max(0.0).to_bits();
+        let least = &self.clearance[triangle as usize][which];
+        // Looking is much cheaper than writing, and most of the time enough.
+        if bits < least.load(Ordering::Relaxed) {
+            least.fetch_min(bits, Ordering::Relaxed);
+        }
     }
 
     /// Tests every pair of `solid` triangles that come within `reach` of each other, of a mesh that was `moved`
@@ -90,10 +95,10 @@ impl Meetings {
             complete: true,
             clearance: solid.iter().map(|&s| if s { [open(reach), open(1.0)] } else { [open(0.0), open(0.0)] }).collect(),
         };
-        let leaves = Leaves { mesh, tree, margin: 0.5005 * reach + moved };
+        let leaves = Leaves::new(mesh, topology, tree, solid, 0.5005 * reach + moved, run)?;
         let count = tree.packets.len();
         let blocks = run.blocks("self-intersections", count.div_ceil(BLOCK), |block| {
-            let (mut found, mut near, mut stack) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut found, mut near, mut stack) = (Vec::new(), Near::default(), Vec::new());
             let mut compared = 0;
             for first in block * BLOCK..((block + 1) * BLOCK).min(count) {
                 run.cancel.check()?;
@@ -103,11 +108,7 @@ impl Meetings {
                 near.clear();
                 leaves.pairs(first as u32, &mut stack, &mut near);
                 compared += near.len();
-                for &pair in near.iter().filter(|pair| pair.iter().all(|&t| solid[t as usize])) {
-                    if !meetings.part(mesh, topology, pair, reach) {
-                        found.push(pair);
-                    }
-                }
+                meetings.part(&leaves, &near, reach, &mut found);
             }
             Ok((found, true))
         })?;
@@ -119,80 +120,204 @@ impl Meetings {
         Ok(meetings)
     }
 
-    /// Whether a pair is proven to be apart but for what it shares; notes its room.
-    fn part(&self, mesh: &TriangleMesh, topology: &Topology, pair: [u32; 2], reach: f64) -> bool {
-        let [mine, other] = pair.map(|t| topology.triangles[t as usize]);
-        let [corners, others] = pair.map(|t| mesh.corners(t));
+    /// Adds the pairs that are not proven to be apart but for what they share; notes the room of all.
+    fn part(&self, leaves: &Leaves<'_>, near: &Near, reach: f64, found: &mut Vec<[u32; 2]>) {
+        found.extend(near.copies.iter().map(|places| places.map(|at| leaves.triangle(at))));
+        for group in near.apart.chunks(LANES) {
+            let pair = |lane: usize| group[lane.min(group.len() - 1)].map(|at| leaves.corners(at));
+            let (mut lanes, mut gaps) = ([[[[0.0; LANES]; 3]; 3]; 2], [0.0; LANES]);
+            for lane in 0..LANES {
+                for (side, corners) in pair(lane).into_iter().enumerate() {
+                    for (corner, v) in corners.iter().enumerate() {
+                        set(&mut lanes[side][corner], lane, *v);
+                    }
+                }
+            }
+            gap(&lanes, reach, &mut gaps);
+            for (places, gap) in group.iter().zip(gaps) {
+                let pair = places.map(|at| leaves.triangle(at));
+                pair.into_iter().for_each(|t| self.keep(t, 0, gap));
+                if gap <= 0.0 {
+                    found.push(pair);
+                }
+            }
+        }
+        for group in near.at_corner.chunks(LANES) {
+            // The arms of both from the corner that they share.
+            let pair = |lane: usize| {
+                let (places, shared) = group[lane.min(group.len() - 1)];
+                let arms = |side: usize| {
+                    let (t, at) = (leaves.corners(places[side]), usize::from(shared[side]));
+                    [t[(at + 1) % 3] - t[at], t[(at + 2) % 3] - t[at]]
+                };
+                [arms(0), arms(1)]
+            };
+            let (mut lanes, mut slopes) = ([[[[0.0; LANES]; 3]; 2]; 2], [[0.0; LANES]; 2]);
+            for lane in 0..LANES {
+                for (side, arms) in pair(lane).into_iter().enumerate() {
+                    for (arm, v) in arms.into_iter().enumerate() {
+                        set(&mut lanes[side][arm], lane, v);
+                    }
+                }
+            }
+            slopes_between(&lanes, &mut slopes);
+            for (lane, (places, _)) in group.iter().enumerate() {
+                let mut slopes = [slopes[0][lane], slopes[1][lane]];
+                if slopes[0].min(slopes[1]) <= STEEP {
+                    let [first, second] = pair(lane);
+                    slopes = slopes_at_corner(first, second);
+                }
+                let pair = places.map(|at| leaves.triangle(at));
+                for (t, slope) in pair.into_iter().zip(slopes) {
+                    self.keep(t, 1, slope);
+                }
+                if slopes[0].min(slopes[1]) <= LEAST_SLOPE {
+                    found.push(pair);
+                }
+            }
+        }
+        for group in near.at_edge.chunks(LANES) {
+            let (mut lanes, mut slopes) = ([[[0.0; LANES]; 3]; 4], [0.0; LANES]);
+            for lane in 0..LANES {
+                let (places, [i, j, k, l]) = group[lane.min(group.len() - 1)];
+                let [first, second] = places.map(|at| leaves.corners(at));
+                let ends = [first[usize::from(i)], first[usize::from(k)]];
+                for (corner, v) in ends.into_iter().chain([first[usize::from(3 - i - k)], second[usize::from(3 - j - l)]]).enumerate() {
+                    set(&mut lanes[corner], lane, v);
+                }
+            }
+            slopes_at_edges(&lanes, &mut slopes);
+            for ((places, _), slope) in group.iter().zip(slopes) {
+                let pair = places.map(|at| leaves.triangle(at));
+                pair.into_iter().for_each(|t| self.keep(t, 1, slope));
+                if slope <= LEAST_SLOPE {
+                    found.push(pair);
+                }
+            }
+        }
+    }
+}
+
+/// Pairs that are compared at once.
+const LANES: usize = 8;
+
+/// Vectors in lanes.
+type Vectors = [[f64; LANES]; 3];
+
+#[inline(always)]
+fn set(vectors: &mut Vectors, lane: usize, v: DVec3) {
+    for axis in 0..3 {
+        vectors[axis][lane] = v[axis];
+    }
+}
+
+#[inline(always)]
+fn get(vectors: &Vectors, lane: usize) -> DVec3 {
+    DVec3::new(vectors[0][lane], vectors[1][lane], vectors[2][lane])
+}
+
+/// Where a triangle is: its leaf times [`WIDTH`], and its lane.
+type Place = u32;
+
+/// Pairs of triangles that come near each other, the lower index first, by what they share.
+#[derive(Default)]
+struct Near {
+    apart: Vec<[Place; 2]>,
+    /// With the corner of the first and of the second.
+    at_corner: Vec<([Place; 2], [u8; 2])>,
+    /// With the corners of the first and the second, end by end.
+    at_edge: Vec<([Place; 2], [u8; 4])>,
+    /// Duplicates.
+    copies: Vec<[Place; 2]>,
+}
+
+impl Near {
+    fn clear(&mut self) {
+        (self.apart.clear(), self.at_corner.clear(), self.at_edge.clear(), self.copies.clear());
+    }
+
+    fn len(&self) -> usize {
+        self.apart.len() + self.at_corner.len() + self.at_edge.len() + self.copies.len()
+    }
+
+    fn add(&mut self, places: [Place; 2], [mine, other]: [&[u32; 3]; 2]) {
         let mut shared = [(0, 0); 3];
         let mut count = 0;
-        for i in 0..3 {
-            if let Some(j) = other.iter().position(|&v| v == mine[i]) {
-                shared[count] = (i, j);
+        for i in 0..3u8 {
+            if let Some(j) = other.iter().position(|&v| v == mine[usize::from(i)]) {
+                shared[count] = (i, j as u8);
                 count += 1;
             }
         }
         match shared[..count] {
-            [] => {
-                let gap = gap(&corners, &others, reach);
-                for t in pair {
-                    self.keep(t, 0, gap);
-                }
-                gap > 0.0
-            }
-            [(i, j)] => {
-                let arms = |t: &[DVec3; 3], at: usize| [t[(at + 1) % 3] - t[at], t[(at + 2) % 3] - t[at]];
-                let slopes = slopes_at_corner(arms(&corners, i), arms(&others, j));
-                for (t, slope) in pair.into_iter().zip(slopes) {
-                    self.keep(t, 1, slope);
-                }
-                slopes[0].min(slopes[1]) > LEAST_SLOPE
-            }
-            [(i, j), (k, l)] => {
-                let slope = slope_at_edge([corners[i], corners[k]], corners[3 - i - k], others[3 - j - l]);
-                for t in pair {
-                    self.keep(t, 1, slope);
-                }
-                slope > LEAST_SLOPE
-            }
-            // Duplicates.
-            _ => false,
+            [] => self.apart.push(places),
+            [(i, j)] => self.at_corner.push((places, [i, j])),
+            [(i, j), (k, l)] => self.at_edge.push((places, [i, j, k, l])),
+            _ => self.copies.push(places),
         }
     }
 }
 
 /// Finds triangles whose boxes come near each other, leaf against leaf.
 struct Leaves<'a> {
-    mesh: &'a TriangleMesh,
     tree: &'a Tree,
+    /// In blocks.
+    leaves: Vec<Vec<Leaf>>,
     /// Boxes are grown by this on all sides.
     margin: f64,
 }
 
-/// Boxes of the triangles of a leaf in lanes, as in a [`Node`].
-struct Boxes {
+/// The triangles of a leaf in lanes; lanes of triangles that are not to be compared have no box.
+struct Leaf {
     min: [[f32; WIDTH]; 3],
     max: [[f32; WIDTH]; 3],
+    corners: [[DVec3; 3]; WIDTH],
+    /// Welded.
+    vertices: [[u32; 3]; WIDTH],
+    triangle: [u32; WIDTH],
 }
 
-impl Leaves<'_> {
-    fn boxes(&self, leaf: u32) -> Boxes {
-        let packet = &self.tree.packets[leaf as usize];
-        let mut boxes = Boxes { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3] };
-        for lane in 0..packet.count as usize {
-            let around = Aabb::around(self.mesh.corners(packet.triangle[lane])).grow(self.margin);
-            for axis in 0..3 {
-                boxes.min[axis][lane] = ((around.min[axis] - self.tree.center[axis]) as f32).next_down();
-                boxes.max[axis][lane] = ((around.max[axis] - self.tree.center[axis]) as f32).next_up();
-            }
-        }
-        boxes
+impl<'a> Leaves<'a> {
+    fn new(mesh: &TriangleMesh, topology: &Topology, tree: &'a Tree, solid: &[bool], margin: f64, run: &Run<'_>) -> Result<Self> {
+        let leaves = run.blocks("self-intersections", tree.packets.len().div_ceil(BLOCK), |block| {
+            let packets = &tree.packets[block * BLOCK..((block + 1) * BLOCK).min(tree.packets.len())];
+            let leaf = |packet: &Packet| {
+                let mut leaf = Leaf {
+                    min: [[f32::INFINITY; WIDTH]; 3],
+                    max: [[f32::NEG_INFINITY; WIDTH]; 3],
+                    corners: packet.triangle.map(|t| mesh.corners(t)),
+                    vertices: packet.triangle.map(|t| topology.triangles[t as usize]),
+                    triangle: packet.triangle,
+                };
+                for lane in (0..packet.count as usize).filter(|&lane| solid[packet.triangle[lane] as usize]) {
+                    let around = Aabb::around(leaf.corners[lane]).grow(margin);
+                    for axis in 0..3 {
+                        leaf.min[axis][lane] = ((around.min[axis] - tree.center[axis]) as f32).next_down();
+                        leaf.max[axis][lane] = ((around.max[axis] - tree.center[axis]) as f32).next_up();
+                    }
+                }
+                leaf
+            };
+            Ok(packets.iter().map(leaf).collect())
+        })?;
+        Ok(Self { tree, leaves, margin })
     }
 
-    /// Adds all pairs of a triangle of `leaf` and one of it or of a later leaf, the lower index first.
-    fn pairs(&self, leaf: u32, stack: &mut Vec<u32>, pairs: &mut Vec<[u32; 2]>) {
-        let own = self.boxes(leaf);
-        let triangles = &self.tree.packets[leaf as usize].triangle;
-        let count = self.tree.packets[leaf as usize].count as usize;
+    fn leaf(&self, index: u32) -> &Leaf {
+        &self.leaves[index as usize / BLOCK][index as usize % BLOCK]
+    }
+
+    fn corners(&self, at: Place) -> &[DVec3; 3] {
+        &self.leaf(at / WIDTH as u32).corners[at as usize % WIDTH]
+    }
+
+    fn triangle(&self, at: Place) -> u32 {
+        self.leaf(at / WIDTH as u32).triangle[at as usize % WIDTH]
+    }
+
+    /// Adds all pairs of a triangle of leaf `index` and one of it or of a later leaf.
+    fn pairs(&self, index: u32, stack: &mut Vec<u32>, near: &mut Near) {
+        let own = self.leaf(index);
         // The tree's own boxes are not grown.
         let margin = (1.0001 * self.margin) as f32 + f32::MIN_POSITIVE;
         let min: [f32; 3] = std::array::from_fn(|axis| (own.min[axis].iter().copied().fold(f32::INFINITY, f32::min) - margin).next_down());
@@ -208,17 +333,21 @@ impl Leaves<'_> {
                 continue;
             }
             let other = child & !LEAF;
-            if other < leaf {
+            if other < index {
                 continue;
             }
-            let boxes = self.boxes(other);
-            let others = &self.tree.packets[other as usize].triangle;
-            for lane in 0..count {
+            let others = self.leaf(other);
+            for lane in 0..WIDTH {
                 let corner = |bounds: &[[f32; WIDTH]; 3]| std::array::from_fn(|axis| bounds[axis][lane]);
-                let hit = overlapping(&boxes.min, &boxes.max, &corner(&own.min), &corner(&own.max));
-                for at in (0..WIDTH).filter(|&at| hit[at] && (other > leaf || at > lane)) {
-                    let (a, b) = (triangles[lane], others[at]);
-                    pairs.push([a.min(b), a.max(b)]);
+                let hit = overlapping(&others.min, &others.max, &corner(&own.min), &corner(&own.max));
+                for at in (0..WIDTH).filter(|&at| hit[at] && (other > index || at > lane)) {
+                    let places = [index * WIDTH as u32 + lane as u32, other * WIDTH as u32 + at as u32];
+                    let vertices = [&own.vertices[lane], &others.vertices[at]];
+                    if own.triangle[lane] < others.triangle[at] {
+                        near.add(places, vertices);
+                    } else {
+                        near.add([places[1], places[0]], [vertices[1], vertices[0]]);
+                    }
                 }
             }
         }
@@ -237,42 +366,89 @@ fn overlapping(mins: &[[f32; WIDTH]; 3], maxs: &[[f32; WIDTH]; 3], min: &[f32; 3
     hit
 }
 
-/// A length that the distance of two triangles is proven to exceed, at most `enough`; 0 if there is none.
-fn gap(first: &[DVec3; 3], second: &[DVec3; 3], enough: f64) -> f64 {
-    let base = first[0];
-    let a = first.map(|v| v - base);
-    let b = second.map(|v| v - base);
-    let noise = a.iter().chain(&b).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt() * (8.0 * UNIT);
-    let edges = |t: &[DVec3; 3]| [t[1] - t[0], t[2] - t[1], t[0] - t[2]];
-    let (ea, eb) = (edges(&a), edges(&b));
-    let (na, nb) = (ea[0].cross(ea[1]), eb[0].cross(eb[1]));
-    let mut best: f64 = 0.0;
-    // Any direction separates if the projections say so: how well it was computed does not matter.
-    let mut try_axis = |axis: DVec3| {
-        let length = axis.length();
-        if length > 0.0 && length.is_finite() {
-            let axis = axis / length;
-            let span = |t: &[DVec3; 3]| {
-                let [x, y, z] = t.map(|v| v.dot(axis));
-                (x.min(y).min(z), x.max(y).max(z))
-            };
-            let ((low, high), (least, most)) = (span(&a), span(&b));
-            best = best.max((least - high).max(low - most) * (1.0 - 1e-12) - noise);
-        }
-        best >= enough
-    };
-    let mut axes = ea.iter().map(|e| na.cross(*e)).chain(eb.iter().map(|e| nb.cross(*e))).chain([na, nb]);
-    if axes.any(&mut try_axis) {
-        return enough;
-    }
-    for e in ea {
-        for f in eb {
-            if try_axis(e.cross(f)) {
-                return enough;
+multiversion!(
+    /// Lengths that the distances of pairs of triangles are proven to exceed, at most `enough`; 0 if there is none.
+    fn gap(pairs: &[[Vectors; 3]; 2], enough: f64, gaps: &mut [f64; LANES]) = gap_body
+);
+
+#[inline(always)]
+fn gap_body<F: Fuse>(pairs: &[[Vectors; 3]; 2], enough: f64, gaps: &mut [f64; LANES]) {
+    let mut noise = [0.0f64; LANES];
+    let mut corners = *pairs;
+    for lane in 0..LANES {
+        let base = get(&pairs[0][0], lane);
+        let mut largest = 0.0f64;
+        for triangle in &mut corners {
+            for v in triangle {
+                let at = get(v, lane) - base;
+                set(v, lane, at);
+                largest = largest.max(at.length_squared());
             }
         }
+        noise[lane] = largest.sqrt() * (8.0 * UNIT);
     }
-    best
+    let [a, b] = &corners;
+    // Axes in the planes of the triangles across their edges, upright ones, then across two edges.
+    for which in 0..17 {
+        for lane in 0..LANES {
+            let edge = |t: &[Vectors; 3], i: usize| get(&t[(i + 1) % 3], lane) - get(&t[i], lane);
+            let upright = |t: &[Vectors; 3]| edge(t, 0).cross(edge(t, 1));
+            let axis = match which {
+                0..3 => upright(a).cross(edge(a, which)),
+                3..6 => upright(b).cross(edge(b, which - 3)),
+                6 => upright(a),
+                7 => upright(b),
+                _ => edge(a, (which - 8) / 3).cross(edge(b, (which - 8) % 3)),
+            };
+            // Any direction separates if the projections say so: how well it was computed does not matter.
+            let length = axis.length();
+            let axis = axis / length;
+            let span = |t: &[Vectors; 3]| {
+                let [x, y, z]: [f64; 3] = std::array::from_fn(|corner| get(&t[corner], lane).dot(axis));
+                (x.min(y).min(z), x.max(y).max(z))
+            };
+            let ((low, high), (least, most)) = (span(a), span(b));
+            let gap = (least - high).max(low - most) * (1.0 - 1e-12) - noise[lane];
+            let holds = (length > 0.0) & (length < f64::INFINITY) & (gap > gaps[lane]);
+            gaps[lane] = if holds { gap } else { gaps[lane] };
+        }
+        if gaps.iter().all(|&gap| gap >= enough) {
+            break;
+        }
+    }
+    for gap in gaps {
+        *gap = gap.min(enough);
+    }
+}
+
+/// A slope that is good enough to stop looking.
+const STEEP: f64 = 0.02;
+
+/// Planes are not known to touch or not below this.
+const TOUCHING: f64 = 1e-7;
+
+multiversion!(
+    /// For pairs of triangles that share one corner, given by their arms from there: the slopes that a plane between their
+    /// middles proves, as in [`slopes_at_corner`]; it most often holds, with room.
+    fn slopes_between(pairs: &[[Vectors; 2]; 2], slopes: &mut [[f64; LANES]; 2]) = slopes_between_body
+);
+
+#[inline(always)]
+fn slopes_between_body<F: Fuse>(pairs: &[[Vectors; 2]; 2], slopes: &mut [[f64; LANES]; 2]) {
+    for lane in 0..LANES {
+        let unit = |v: DVec3| {
+            let inverse = 1.0 / v.length();
+            v * if inverse < f64::INFINITY { inverse } else { 0.0 }
+        };
+        let arm = |side: usize, arm: usize| unit(get(&pairs[side][arm], lane));
+        let outward = [arm(0, 0), arm(0, 1), -arm(1, 0), -arm(1, 1)];
+        let normal = unit(outward[0] + outward[1] + outward[2] + outward[3]);
+        let rise = outward.map(|v| v.dot(normal) - 16.0 * UNIT);
+        let least = rise[0].min(rise[1]).min(rise[2]).min(rise[3]);
+        let holds = least > TOUCHING;
+        slopes[0][lane] = if holds { rise[0].min(rise[1]) } else { 0.0 };
+        slopes[1][lane] = if holds { rise[2].min(rise[3]) } else { 0.0 };
+    }
 }
 
 /// For two triangles that share one corner, given by their arms from there: the largest proven slopes
@@ -283,9 +459,6 @@ fn gap(first: &[DVec3; 3], second: &[DVec3; 3], enough: f64) -> f64 {
 /// touches: the plane of a triangle, a plane through one arm of each, or a plane upright on an arm; tilted
 /// a little so that it no longer touches.
 fn slopes_at_corner(first: [DVec3; 2], second: [DVec3; 2]) -> [f64; 2] {
-    /// Good enough to stop looking.
-    const STEEP: f64 = 0.02;
-    const TOUCHING: f64 = 1e-7;
     let a = first.map(DVec3::normalize_or_zero);
     let b = second.map(DVec3::normalize_or_zero);
     let (na, nb) = (a[0].cross(a[1]), b[0].cross(b[1]));
@@ -308,7 +481,6 @@ fn slopes_at_corner(first: [DVec3; 2], second: [DVec3; 2]) -> [f64; 2] {
         }
         best[0].min(best[1]) > STEEP
     };
-    // Between the two wedges: the one that most often holds, with room.
     if try_plane(a[0] + a[1] - b[0] - b[1]) {
         return best;
     }
@@ -323,19 +495,30 @@ fn slopes_at_corner(first: [DVec3; 2], second: [DVec3; 2]) -> [f64; 2] {
     best
 }
 
-/// For two triangles that share an edge: the sine of the angle between them, proven from below; 1 beyond
-/// a right angle, 0 where they may lie on each other.
-fn slope_at_edge(edge: [DVec3; 2], first: DVec3, second: DVec3) -> f64 {
-    let along = (edge[1] - edge[0]).normalize_or_zero();
-    let arms = [first, second].map(|v| {
-        let w = v - edge[0];
-        let across = w - along * w.dot(along);
-        (across.normalize_or_zero(), 16.0 * UNIT * w.length() / across.length())
-    });
-    let noise = arms[0].1 + arms[1].1;
-    if noise.is_nan() || noise > 1e-3 {
-        return 0.0;
+multiversion!(
+    /// For pairs of triangles that share an edge, given by its ends, the other corner of the first and that of the second: the
+    /// sine of the angle between them, proven from below; 1 beyond a right angle, 0 where they may lie on each other.
+    fn slopes_at_edges(pairs: &[Vectors; 4], slopes: &mut [f64; LANES]) = slopes_at_edges_body
+);
+
+#[inline(always)]
+fn slopes_at_edges_body<F: Fuse>(pairs: &[Vectors; 4], slopes: &mut [f64; LANES]) {
+    for lane in 0..LANES {
+        let from = get(&pairs[0], lane);
+        let along = get(&pairs[1], lane) - from;
+        let along = along / along.length();
+        let arm = |corner: usize| {
+            let w = get(&pairs[corner], lane) - from;
+            let across = w - along * w.dot(along);
+            let length = across.length();
+            (across / length, 16.0 * UNIT * w.length() / length)
+        };
+        let ((first, off), (second, other)) = (arm(2), arm(3));
+        let noise = off + other;
+        let (cosine, sine) = (first.dot(second), first.cross(second).length());
+        let slope = (sine - 2.0 * noise).clamp(0.0, 1.0);
+        let slope = if cosine < -2.0 * noise { 1.0 } else { slope };
+        // Not-a-number falls on the careful side.
+        slopes[lane] = if noise <= 1e-3 { slope } else { 0.0 };
     }
-    let (cosine, sine) = (arms[0].0.dot(arms[1].0), arms[0].0.cross(arms[1].0).length());
-    if cosine < -2.0 * noise { 1.0 } else { (sine - 2.0 * noise).clamp(0.0, 1.0) }
 }
