@@ -122,6 +122,19 @@ impl Run<'_> {
         Ok(slots.into_iter().flatten().collect())
     }
 
+    /// Runs two jobs side by side where there are threads for it; an error of the first comes before one of the second.
+    pub fn both<A: Send, B: Send>(&self, first: impl FnOnce() -> Result<A>, second: impl FnOnce() -> Result<B> + Send) -> Result<(A, B)> {
+        if self.threads <= 1 {
+            return Ok((first()?, second()?));
+        }
+        std::thread::scope(|scope| {
+            let second = scope.spawn(second);
+            let first = first();
+            let second = second.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            Ok((first?, second?))
+        })
+    }
+
     /// Runs `work(index, chunk)` over disjoint chunks of `length` items of `data`, in parallel.
     pub fn chunks<T: Send>(
         &self,

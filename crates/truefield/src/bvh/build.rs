@@ -17,12 +17,10 @@ const DEEP: usize = 20;
 /// Triangles or leaves a worker takes at once.
 const CHUNK: usize = 4096;
 
-/// A box in single precision around the tree's centre, rounded outward.
+/// A box in single precision around the tree's centre, rounded outward: its least corner from lane 0 on, its greatest,
+/// negated, from lane 4 on, so that one comparison of vectors serves both.
 #[derive(Clone, Copy)]
-struct Bounds {
-    min: [f32; 3],
-    max: [f32; 3],
-}
+struct Bounds([f32; 8]);
 
 /// A triangle to be placed.
 #[derive(Clone, Copy)]
@@ -164,12 +162,16 @@ impl<'a> Part<'a> {
     fn split(self, depth: usize) -> (Self, Self) {
         let mut centers = Bounds::EMPTY;
         for item in self.items.iter() {
-            let at = item.bounds.twice_center();
-            centers = centers.union(&Bounds { min: at, max: at });
+            let mut at = Bounds::EMPTY;
+            for axis in 0..3 {
+                let center = item.bounds.twice_center(axis);
+                (at.0[axis], at.0[axis + 4]) = (center, -center);
+            }
+            centers = centers.union(&at);
         }
-        let scale: [f32; 3] = std::array::from_fn(|axis| BINS as f32 / (centers.max[axis] - centers.min[axis]));
+        let scale: [f32; 3] = std::array::from_fn(|axis| BINS as f32 / (centers.max(axis) - centers.min(axis)));
         let bin_of =
-            |item: &Item, axis: usize| (((item.bounds.twice_center()[axis] - centers.min[axis]) * scale[axis]) as usize).min(BINS - 1);
+            |item: &Item, axis: usize| (((item.bounds.twice_center(axis) - centers.min(axis)) * scale[axis]) as usize).min(BINS - 1);
         let mut bins = [[(Bounds::EMPTY, 0usize); BINS]; 3];
         if depth < DEEP {
             for item in self.items.iter() {
@@ -225,33 +227,38 @@ fn partition(items: &mut [Item], left: impl Fn(&Item) -> bool) -> usize {
 }
 
 impl Bounds {
-    const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+    const EMPTY: Self = Self([f32::INFINITY; 8]);
 
     fn around(b: &Aabb, center: DVec3) -> Self {
-        Self {
-            min: std::array::from_fn(|axis| below(b.min[axis] - center[axis])),
-            max: std::array::from_fn(|axis| -below(center[axis] - b.max[axis])),
+        let mut bounds = Self::EMPTY;
+        for axis in 0..3 {
+            bounds.0[axis] = below(b.min[axis] - center[axis]);
+            bounds.0[axis + 4] = below(center[axis] - b.max[axis]);
         }
+        bounds
+    }
+
+    fn min(&self, axis: usize) -> f32 {
+        self.0[axis]
+    }
+
+    fn max(&self, axis: usize) -> f32 {
+        -self.0[axis + 4]
     }
 
     #[inline(always)]
     fn union(&self, other: &Self) -> Self {
         // Never NaN: comparisons are what the processor does at once.
-        let least = |a: f32, b: f32| if b < a { b } else { a };
-        let most = |a: f32, b: f32| if b > a { b } else { a };
-        Self {
-            min: std::array::from_fn(|axis| least(self.min[axis], other.min[axis])),
-            max: std::array::from_fn(|axis| most(self.max[axis], other.max[axis])),
-        }
+        Self(std::array::from_fn(|lane| if other.0[lane] < self.0[lane] { other.0[lane] } else { self.0[lane] }))
     }
 
     #[inline(always)]
-    fn twice_center(&self) -> [f32; 3] {
-        std::array::from_fn(|axis| self.min[axis] + self.max[axis])
+    fn twice_center(&self, axis: usize) -> f32 {
+        self.0[axis] - self.0[axis + 4]
     }
 
     fn area(&self) -> f32 {
-        let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| self.max[axis] - self.min[axis]);
+        let [x, y, z]: [f32; 3] = std::array::from_fn(|axis| self.max(axis) - self.min(axis));
         if x < 0.0 { 0.0 } else { x * y + y * z + z * x }
     }
 }
@@ -261,8 +268,8 @@ impl Node {
 
     fn set(&mut self, slot: usize, bounds: &Bounds, child: u32) {
         for axis in 0..3 {
-            self.min[axis][slot] = bounds.min[axis];
-            self.max[axis][slot] = bounds.max[axis];
+            self.min[axis][slot] = bounds.min(axis);
+            self.max[axis][slot] = bounds.max(axis);
         }
         self.child[slot] = child;
     }

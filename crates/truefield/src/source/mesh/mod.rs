@@ -18,6 +18,7 @@ use crate::distance::{Closest, Distance};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, FacetPoint, Feature, Interval, Nearest};
 use crate::mesh::TriangleMesh;
+use crate::mesh::topology::Topology;
 use crate::run::Run;
 
 pub(crate) use sign::Signs;
@@ -41,8 +42,12 @@ impl Surface {
     pub fn new(mesh: Arc<TriangleMesh>, sign: SignChoice, run: &Run<'_>) -> Result<Self> {
         let (scaled, scale) = well_sized(&mesh)?;
         let work = scaled.map_or_else(|| Arc::clone(&mesh), Arc::new);
-        let tree = Tree::build(&work, run)?;
-        let signs = Signs::new(&work, &tree, sign, run)?;
+        let topology = || Ok((sign != SignChoice::Unsigned).then(|| Topology::new(&work)));
+        let (tree, topology) = run.both(|| Tree::build(&work, run), topology)?;
+        let signs = match topology {
+            Some(topology) => Signs::new(&work, topology, &tree, sign, run)?,
+            None => Signs::none(),
+        };
         Ok(Self { mesh, work, scale, tree, signs })
     }
 

@@ -60,45 +60,25 @@ pub(crate) struct Pseudonormals {
 }
 
 impl Pseudonormals {
-    /// For any mesh. With a proof, only corners and edges around which the surface is whole are given a normal.
-    pub fn new(mesh: &TriangleMesh, topology: &Topology, proof: Option<&Proof<'_>>) -> Self {
-        let count = topology.triangles.len();
+    /// For any mesh; nothing is proven.
+    pub fn new(mesh: &TriangleMesh, topology: &Topology) -> Self {
+        let faces: Vec<Pseudonormal> = (0..topology.triangles.len() as u32).map(|t| face(&mesh.corners(t))).collect();
         let mut corners = vec![Pseudonormal::default(); mesh.vertices().len()];
-        for (t, welded) in topology.triangles.iter().enumerate() {
+        for (t, (welded, &normal)) in topology.triangles.iter().zip(&faces).enumerate() {
             let at = mesh.corners(t as u32);
-            let normal = face(&at);
             for k in 0..3 {
                 let (u, v) = (at[(k + 1) % 3] - at[k], at[(k + 2) % 3] - at[k]);
                 corners[welded[k] as usize].add(normal, u.cross(v).length().atan2(u.dot(v)));
             }
         }
-        let mut edge_of = vec![[u32::MAX; 3]; count];
-        let mut edges = Vec::new();
-        let mut ends = Vec::new();
-        if let Some(Proof { sound, .. }) = proof {
-            let unsound = topology.triangles.iter().zip(*sound).filter(|(welded, sound)| !**sound && !collapsed(welded));
-            for &corner in unsound.flat_map(|(welded, _)| welded) {
-                corners[corner as usize].error = f64::INFINITY;
-            }
-            for (corner, pinched) in corners.iter_mut().zip(topology.pinched()) {
-                if *pinched {
-                    corner.error = f64::INFINITY;
-                }
-            }
-        }
+        let mut edge_of = vec![[u32::MAX; 3]; faces.len()];
+        let mut edges = Vec::with_capacity(faces.len() * 3 / 2);
+        let mut ends = Vec::with_capacity(faces.len() * 3 / 2);
         for sides in topology.edges() {
             let mut sum = Pseudonormal::default();
-            if let Some(Proof { sound, .. }) = proof
-                && !matches!(sides, [a, b] if a.forward != b.forward && sound[a.triangle as usize] && sound[b.triangle as usize])
-            {
-                sum.error = f64::INFINITY;
-                for end in sides[0].ends {
-                    corners[end as usize].error = f64::INFINITY;
-                }
-            }
             for side in sides {
                 edge_of[side.triangle as usize][usize::from(side.side)] = edges.len() as u32;
-                sum.add(face(&mesh.corners(side.triangle)), PI);
+                sum.add(faces[side.triangle as usize], PI);
             }
             edges.push(sum);
             ends.push(sides[0].ends);
@@ -112,16 +92,36 @@ impl Pseudonormals {
                 }
             }
         }
-        let room = proof.map_or_else(Vec::new, |proof| {
-            (0..count as u32)
-                .map(|t| {
-                    let Clearance { gap, slope } = proof.meetings.clearance(t);
-                    if proof.sound[t as usize] { [gap as f32, slope as f32] } else { [0.0; 2] }
-                })
-                .collect()
-        });
-        let rounding = rounding(mesh) + 2.0 * proof.map_or(0.0, |proof| proof.moved);
-        Self { edge_of, corner_of: topology.triangles.clone(), edges, corners, room, rounding }
+        Self { edge_of, corner_of: topology.triangles.clone(), edges, corners, room: Vec::new(), rounding: rounding(mesh) }
+    }
+
+    /// Leaves only corners and edges around which the surface is whole their normal, and notes how much room they have.
+    pub fn prove(mut self, topology: &Topology, proof: &Proof<'_>) -> Self {
+        let unsound = topology.triangles.iter().zip(proof.sound).filter(|(welded, sound)| !**sound && !collapsed(welded));
+        for &corner in unsound.flat_map(|(welded, _)| welded) {
+            self.corners[corner as usize].error = f64::INFINITY;
+        }
+        for (corner, pinched) in self.corners.iter_mut().zip(topology.pinched()) {
+            if *pinched {
+                corner.error = f64::INFINITY;
+            }
+        }
+        let sound = |t: u32| proof.sound[t as usize];
+        for (sides, edge) in topology.edges().zip(&mut self.edges) {
+            if !matches!(sides, [a, b] if a.forward != b.forward && sound(a.triangle) && sound(b.triangle)) {
+                edge.error = f64::INFINITY;
+                for end in sides[0].ends {
+                    self.corners[end as usize].error = f64::INFINITY;
+                }
+            }
+        }
+        let room = |t: u32| {
+            let Clearance { gap, slope } = proof.meetings.clearance(t);
+            if sound(t) { [gap as f32, slope as f32] } else { [0.0; 2] }
+        };
+        self.room = (0..self.corner_of.len() as u32).map(room).collect();
+        self.rounding += 2.0 * proof.moved;
+        self
     }
 
     /// How far a nearest point may be off.

@@ -116,13 +116,14 @@ enum Walls {
 }
 
 impl Signs {
-    /// Finds the rule and prepares it. O(n log n).
-    pub fn new(mesh: &TriangleMesh, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
-        if choice == SignChoice::Unsigned {
-            let reason = "sides were not asked for: distances are positive everywhere".into();
-            return Ok(Self { rule: SignRule { kind: SignKind::Unsigned, reason }, decided: None, parted: true, blur: 0.0 });
-        }
-        let mut topology = Topology::new(mesh);
+    /// Sides that were not asked for.
+    pub fn none() -> Self {
+        let reason = "sides were not asked for: distances are positive everywhere".into();
+        Self { rule: SignRule { kind: SignKind::Unsigned, reason }, decided: None, parted: true, blur: 0.0 }
+    }
+
+    /// Finds the rule and prepares it, for a choice with sides. O(n log n).
+    pub fn new(mesh: &TriangleMesh, mut topology: Topology, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
         run.cancel.check()?;
         let joined = if choice == SignChoice::Pseudonormal || topology.is_closed() { None } else { join_vertices(mesh)? };
         let moved = joined.as_ref().map_or(0.0, |joined| joined.within);
@@ -130,17 +131,25 @@ impl Signs {
         if joined.is_some() {
             topology = Topology::new(mesh);
         }
-        let layers = Layers::new(mesh, &topology);
-        let sum = Sum::new(mesh, &layers, run)?;
+        let sums = || {
+            let layers = Layers::new(mesh, &topology);
+            let sum = Sum::new(mesh, &layers, run)?;
+            Ok((layers, sum))
+        };
+        let edges = || {
+            let check = Check::of_edges(mesh, &topology);
+            run.cancel.check()?;
+            Ok((check, Pseudonormals::new(mesh, &topology)))
+        };
+        let ((layers, sum), (check, normals)) = run.both(sums, edges)?;
         let closed = sum.boundary.is_empty();
-        let (fault, meetings) = look(mesh, &topology, tree, &sum.winding, moved, run)?;
+        let (fault, meetings) = look(check, mesh, &topology, tree, &sum.winding, moved, run)?;
         let rule = rule(choice, fault.as_deref(), joined.as_ref(), closed);
         let (normals, walls) = if fault.is_some() && rule.kind == SignKind::Pseudonormal {
-            (Pseudonormals::new(mesh, &topology, None), Walls::Trusted)
+            (normals, Walls::Trusted)
         } else {
             let sound = meetings.sound(layers.alone(mesh, &topology));
-            let proof = Proof { meetings: &meetings, sound: &sound, moved };
-            let normals = Pseudonormals::new(mesh, &topology, Some(&proof));
+            let normals = normals.prove(&topology, &Proof { meetings: &meetings, sound: &sound, moved });
             let known = || walls(mesh, &topology, tree, &sound, &sum.winding, &sum.boundary, run).map(Walls::Known);
             (normals, if fault.is_none() { Walls::Clean } else { known()? })
         };
@@ -228,8 +237,10 @@ impl Signs {
     }
 }
 
-/// The first thing that keeps pseudonormals from being proven for the whole mesh, cheap conditions first, and where its triangles meet.
+/// The first thing that keeps pseudonormals from being proven for the whole mesh, cheap conditions first, and where its triangles
+/// meet; `check` has seen its edges.
 fn look(
+    mut check: Check,
     mesh: &TriangleMesh,
     topology: &Topology,
     tree: &Tree,
@@ -237,7 +248,6 @@ fn look(
     moved: f64,
     run: &Run<'_>,
 ) -> Result<(Option<String>, Meetings)> {
-    let mut check = Check::of_edges(mesh, topology);
     let mut fault = check.fault();
     if fault.is_none() {
         check.add_shells(mesh, topology, winding, run)?;
@@ -385,7 +395,10 @@ mod tests {
     impl Asked {
         fn new(mesh: TriangleMesh, choice: SignChoice) -> Self {
             let tree = Tree::build(&mesh, &Run::default()).expect("a tree");
-            let signs = Signs::new(&mesh, &tree, choice, &Run::default()).expect("signs");
+            let signs = match choice {
+                SignChoice::Unsigned => Signs::none(),
+                _ => Signs::new(&mesh, Topology::new(&mesh), &tree, choice, &Run::default()).expect("signs"),
+            };
             Self { mesh, tree, signs }
         }
 
