@@ -5,6 +5,7 @@ use crate::bvh::evaluate::{Answers, BLOCK, Points};
 use crate::bvh::tree::Slot;
 use crate::bvh::{Candidate, Tree};
 use crate::geom::DVec3;
+use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
 /// Lists up to this length are searched; longer ones are slower than the tree.
@@ -55,100 +56,125 @@ impl<'a> Sides<'a> {
         let reach = points.x[0].abs().max(points.y[0].abs()).max(points.z[0].abs())
             + tree.extent.max.abs().max(tree.extent.min.abs()).max_element();
         let slack = 64.0 * f64::EPSILON * reach;
-        let mut flood = Flood {
-            size: std::array::from_fn(|axis| block.high[axis] - block.low[axis]),
-            distance: std::array::from_fn(|i| answers.squared[i].sqrt()),
-            steps: [1.0f64, 2.0, 3.0].map(|squared| squared.sqrt() * spacing * (1.0 + 1e-9) + slack),
-            sides: [None; BLOCK],
-            carries: [0.0; BLOCK],
-        };
-        // The longest path through a block is asked for.
-        let longest = 10.0 * spacing;
-        let mut order: [(f64, u8); BLOCK] = std::array::from_fn(|i| (flood.distance[i], i as u8));
-        order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let mut held = [false; BLOCK];
+        let steps = [1.0f64, 2.0, 3.0].map(|squared| squared.sqrt() * spacing * (1.0 + 1e-9) + slack);
+        let mut left = 0u64;
         for (i, _) in slots(block) {
-            held[i] = answers.triangle[i] != u32::MAX;
+            left |= u64::from(answers.triangle[i] != u32::MAX) << i;
         }
-        for i in order.map(|(_, i)| usize::from(i)) {
-            if !held[i] || flood.sides[i].is_some() {
-                continue;
+        let mut clear = Clear([0; WAYS.len()]);
+        clear_ways(answers, &steps, &mut clear);
+        // A side carries across a block, from the first point that is asked.
+        let longest = 10.0 * spacing;
+        let mut sides = [Side::Outside; BLOCK];
+        while left != 0 {
+            let i = farthest(&answers.squared, left);
+            let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
+            let triangle = answers.triangle[i];
+            let (side, carry) = self.surface.steady(p, &tree.facet(triangle).nearest(p), triangle, longest);
+            let reached = if side.is_certain() { clear.reach(1 << i, left, carry / steps[2]) } else { 1 << i };
+            left &= !reached;
+            for i in bits(reached) {
+                sides[i] = side;
             }
-            if !flood.take_over(i) {
-                let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
-                let triangle = answers.triangle[i];
-                let (side, carry) = self.surface.steady(p, &tree.facet(triangle).nearest(p), triangle, longest);
-                (flood.sides[i], flood.carries[i]) = (Some(side), if side.is_certain() { carry } else { 0.0 });
-            }
-            flood.hand_on(i, &held);
         }
-        flood.sides.map(|side| side.unwrap_or(Side::Outside))
+        sides
     }
 }
 
-/// Sides spreading over a block: two balls that overlap leave no room for the surface between their centres.
-struct Flood {
-    size: [i64; 3],
-    distance: [f64; BLOCK],
-    /// Lengths of steps along one, two and three axes, with room for rounding.
-    steps: [f64; 3],
-    sides: [Option<Side>; BLOCK],
-    /// How far each side carries along paths off the surface.
-    carries: [f64; BLOCK],
-}
+/// The way to a neighbour: how far on it is, along how many axes, and the slots that have one there.
+type Way = (u32, usize, u64);
 
-impl Flood {
-    /// The slot `step` away, if it is in the block.
-    fn neighbour(&self, place: [i64; 3], step: [i64; 3]) -> Option<usize> {
-        let at: [i64; 3] = std::array::from_fn(|axis| place[axis] + step[axis]);
-        (0..3).all(|axis| (0..self.size[axis]).contains(&at[axis])).then(|| (at[0] * 16 + at[1] * 4 + at[2]) as usize)
-    }
-
-    /// Gives slot `to` the side of slot `from`, `length` away, if the way there is clear.
-    fn copy(&mut self, from: usize, to: usize, length: f64) -> bool {
-        let clear = self.sides[from].is_some() && self.carries[from] >= length && self.distance[from] + self.distance[to] > length;
-        if clear {
-            (self.sides[to], self.carries[to]) = (self.sides[from], self.carries[from] - length);
-        }
-        clear
-    }
-
-    /// Takes a side over from any of the 26 neighbours.
-    fn take_over(&mut self, to: usize) -> bool {
-        let at = place(to);
-        for step in (0..27).map(|n| [n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1]) {
-            let axes = step.iter().filter(|&&x| x != 0).count();
-            if axes == 0 {
-                continue;
-            }
-            if let Some(from) = self.neighbour(at, step)
-                && self.copy(from, to, self.steps[axes - 1])
-            {
-                return true;
-            }
-        }
-        false
-    }
-
-    /// Hands a side on along the axes, as far as it goes.
-    fn hand_on(&mut self, from: usize, held: &[bool; BLOCK]) {
-        const AXES: [[i64; 3]; 6] = [[0, 0, 1], [0, 0, -1], [0, 1, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]];
-        let mut stack = [0u8; BLOCK];
-        stack[0] = from as u8;
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            let from = usize::from(stack[height]);
-            let at = place(from);
-            for step in AXES {
-                let Some(to) = self.neighbour(at, step) else { continue };
-                if held[to] && self.sides[to].is_none() && self.copy(from, to, self.steps[0]) {
-                    stack[height] = to as u8;
-                    height += 1;
+/// Half of the 26 neighbours; the others are those whose neighbour a slot is.
+const WAYS: [Way; 13] = {
+    let mut ways = [(0, 0, 0); 13];
+    let mut n = 0;
+    while n < 13 {
+        // The later half of the steps -1, 0, 1 along three axes.
+        let step = [(n as i32 + 14) / 9 - 1, (n as i32 + 14) / 3 % 3 - 1, (n as i32 + 14) % 3 - 1];
+        let mut axes = 0;
+        let mut held = u64::MAX;
+        let mut axis = 0;
+        while axis < 3 {
+            axes += (step[axis] != 0) as usize;
+            let mut i = 0;
+            while i < 64 {
+                let at = (i >> (4 - 2 * axis) & 3) + step[axis];
+                if at < 0 || at > 3 {
+                    held &= !(1u64 << i);
                 }
+                i += 1;
             }
+            axis += 1;
         }
+        ways[n] = ((16 * step[0] + 4 * step[1] + step[2]) as u32, axes, held);
+        n += 1;
     }
+    ways
+};
+
+/// By way: the slots from which it leads clear of the surface, as two balls that overlap leave no room for it between their centres.
+struct Clear([u64; WAYS.len()]);
+
+impl Clear {
+    /// The slots among `open` that can be reached from those of `from` in so many steps.
+    fn reach(&self, from: u64, open: u64, steps: f64) -> u64 {
+        let mut reached = from;
+        let mut step = 1.0;
+        while step <= steps {
+            let mut next = reached;
+            for (&(on, ..), clear) in WAYS.iter().zip(self.0) {
+                next |= (reached & clear) << on | (reached >> on) & clear;
+            }
+            next &= open;
+            if next == reached {
+                break;
+            }
+            reached = next;
+            step += 1.0;
+        }
+        reached
+    }
+}
+
+multiversion!(
+    /// Finds the clear ways of a block, whose steps along one, two and three axes have the lengths `steps`.
+    fn clear_ways(answers: &Answers, steps: &[f64; 3], clear: &mut Clear) = clear_ways_body
+);
+
+#[inline(always)]
+fn clear_ways_body<F: Fuse>(answers: &Answers, steps: &[f64; 3], clear: &mut Clear) {
+    const LANES: usize = 16;
+    // Single precision, shorter than the truth by more than all its rounding; slots beyond the block lead nowhere.
+    let mut distance = [0.0f32; BLOCK + 32];
+    for (distance, squared) in distance.iter_mut().zip(&answers.squared) {
+        *distance = squared.sqrt() as f32 * (1.0 - 8.0 * f32::EPSILON);
+    }
+    for (&(on, axes, held), clear) in WAYS.iter().zip(&mut clear.0) {
+        let length = [(steps[axes - 1] as f32).next_up(); LANES];
+        let mut blocked = 0u64;
+        for start in (0..BLOCK).step_by(LANES) {
+            let mut sum = [0.0f32; LANES];
+            for lane in 0..LANES {
+                sum[lane] = distance[start + lane] + distance[start + lane + on as usize];
+            }
+            blocked |= u64::from(F::mask_not_above(&sum, &length)) << start;
+        }
+        *clear = held & !blocked;
+    }
+}
+
+/// The one of `among` with the greatest distance, the lowest of those.
+fn farthest(squared: &[f64; BLOCK], among: u64) -> usize {
+    bits(among).fold((0, -1.0), |best, i| if squared[i] > best.1 { (i, squared[i]) } else { best }).0
+}
+
+/// The places of the ones, ascending.
+fn bits(mut ones: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let at = ones.trailing_zeros() as usize;
+        ones &= ones.wrapping_sub(1);
+        (at < BLOCK).then_some(at)
+    })
 }
 
 /// The nearest triangle of a point, from the complete list of a box around it where that is short.

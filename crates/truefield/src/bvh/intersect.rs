@@ -233,7 +233,10 @@ struct Near {
 
 impl Near {
     fn clear(&mut self) {
-        (self.apart.clear(), self.at_corner.clear(), self.at_edge.clear(), self.copies.clear());
+        self.apart.clear();
+        self.at_corner.clear();
+        self.at_edge.clear();
+        self.copies.clear();
     }
 
     fn len(&self) -> usize {
@@ -520,5 +523,99 @@ fn slopes_at_edges_body<F: Fuse>(pairs: &[Vectors; 4], slopes: &mut [f64; LANES]
         let slope = if cosine < -2.0 * noise { 1.0 } else { slope };
         // Not-a-number falls on the careful side.
         slopes[lane] = if noise <= 1e-3 { slope } else { 0.0 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Facet;
+    use crate::laws::Random;
+
+    /// A point of a triangle, near its corners and edges too.
+    fn inside(random: &mut Random, [a, b, c]: &[DVec3; 3]) -> DVec3 {
+        let (s, t) = (random.unit() * random.length(1e-6, 1.0), random.unit() * random.length(1e-6, 1.0));
+        let (s, t) = if s + t > 1.0 { (1.0 - s, 1.0 - t) } else { (s, t) };
+        *a + (*b - *a) * s + (*c - *a) * t
+    }
+
+    fn facet(&[a, b, c]: &[DVec3; 3]) -> Facet {
+        Facet::new(a, b, c)
+    }
+
+    /// A triangle from a corner, a sliver now and then.
+    fn from(random: &mut Random, corner: DVec3) -> [DVec3; 3] {
+        let (u, v) = (random.direction(), random.direction());
+        [corner, corner + u, corner + if random.below(3) == 0 { u * 0.5 + v * random.length(1e-12, 1e-2) } else { v }]
+    }
+
+    #[test]
+    fn no_gap_and_no_slope_is_more_than_there_is() {
+        let mut random = Random::new(4);
+        let (mut apart, mut at_corner, mut at_edge) = (0, 0, 0);
+        for _ in 0..20_000 {
+            let base = random.direction() * 3.0;
+            let pairs: [[[DVec3; 3]; 2]; LANES] = std::array::from_fn(|_| {
+                let first = from(&mut random, base);
+                let away = random.direction() * random.length(1e-9, 2.0);
+                [first, from(&mut random, base + away)]
+            });
+            let mut lanes = [[[[0.0; LANES]; 3]; 3]; 2];
+            for (lane, pair) in pairs.iter().enumerate() {
+                for (side, corners) in pair.iter().enumerate() {
+                    for (corner, v) in corners.iter().enumerate() {
+                        set(&mut lanes[side][corner], lane, *v);
+                    }
+                }
+            }
+            let mut gaps = [0.0; LANES];
+            gap(&lanes, 0.5, &mut gaps);
+            for (pair, gap) in pairs.iter().zip(gaps) {
+                apart += usize::from(gap > 0.0);
+                let p = inside(&mut random, &pair[0]);
+                assert!(facet(&pair[1]).distance_squared(p).sqrt() >= gap * (1.0 - 1e-9) - 1e-14, "{pair:?}: {gap}");
+            }
+            // The second moved to share the first corner of the first, then its first edge.
+            let second = pairs.map(|[first, second]| second.map(|v| v + (first[0] - second[0])));
+            let mut arms = [[[[0.0; LANES]; 3]; 2]; 2];
+            let mut edges = [[[0.0; LANES]; 3]; 4];
+            for lane in 0..LANES {
+                let first = &pairs[lane][0];
+                for (side, t) in [first, &second[lane]].into_iter().enumerate() {
+                    set(&mut arms[side][0], lane, t[1] - t[0]);
+                    set(&mut arms[side][1], lane, t[2] - t[0]);
+                }
+                for (corner, v) in first.iter().chain([&second[lane][2]]).enumerate() {
+                    set(&mut edges[corner], lane, *v);
+                }
+            }
+            let (mut slopes, mut bends) = ([[0.0; LANES]; 2], [0.0; LANES]);
+            slopes_between(&arms, &mut slopes);
+            slopes_at_edges(&edges, &mut bends);
+            for lane in 0..LANES {
+                let (first, second) = (&pairs[lane][0], &second[lane]);
+                let arms = [first, second].map(|t| [t[1] - t[0], t[2] - t[0]]);
+                let alone = slopes_at_corner(arms[0], arms[1]);
+                for slopes in [[slopes[0][lane], slopes[1][lane]], alone] {
+                    at_corner += usize::from(slopes[0] > 0.0);
+                    for (t, other, slope) in [(first, second, slopes[0]), (second, first, slopes[1])] {
+                        let p = inside(&mut random, t);
+                        let far = facet(other).distance_squared(p).sqrt();
+                        assert!(far >= slope * (p - t[0]).length() * (1.0 - 1e-9) - 1e-14, "{t:?} {other:?}: {slope}");
+                    }
+                }
+                let (second, slope) = ([first[0], first[1], second[2]], bends[lane]);
+                at_edge += usize::from(slope > 0.0);
+                let along = (first[1] - first[0]).normalize();
+                for (t, other) in [(first, &second), (&second, first)] {
+                    let p = inside(&mut random, t);
+                    let off = (p - t[0]) - along * (p - t[0]).dot(along);
+                    let far = facet(other).distance_squared(p).sqrt();
+                    assert!(far >= slope * off.length() * (1.0 - 1e-9) - 1e-14, "{t:?} {other:?}: {slope}");
+                }
+            }
+        }
+        // Bounds of nothing hold too.
+        assert!(apart > 40_000 && at_corner > 40_000 && at_edge > 80_000, "{apart} {at_corner} {at_edge}");
     }
 }
