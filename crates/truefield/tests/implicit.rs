@@ -284,6 +284,105 @@ fn bends_hold_second_differences_and_slack_holds_the_rest() {
     }
 }
 
+/// Places as a tree asks for them: lattices of cells, of which many lie on planes of symmetry.
+fn lattices(random: &mut Random, domain: &Aabb, count: usize) -> Vec<DVec3> {
+    let mut places = Vec::new();
+    for index in 0..count {
+        let size = domain.size().x / f64::from(1 << (1 + index % 6));
+        let steps = (domain.size().x / size) as usize;
+        let mut place = || size * (random.between(0.0, steps as f64)).floor();
+        let low = domain.min + DVec3::new(place(), place(), place());
+        places.extend((0..125).map(|k| low + DVec3::new(f64::from(k % 5), f64::from(k / 5 % 5), f64::from(k / 25)) * (size / 4.0)));
+    }
+    places
+}
+
+#[test]
+fn points_asked_together_are_answered_as_alone() {
+    let mut random = Random::new(8);
+    let shapes = [(gyroid(), cube(PI)), (gyroid(), cube(2.5)), (torus(1.0, 0.4), cube(1.7)), (ball(), cube(1.5))];
+    for (expression, domain) in &shapes {
+        let shape = shape(expression, *domain);
+        let mut places = lattices(&mut random, domain, 60);
+        places.extend(points(&mut random, &domain.grow(1.0), 200));
+        let mut together = vec![0.0; places.len()];
+        shape.values(&places, &mut together).expect("values");
+        let mut bounds = vec![Interval::ALL; places.len()];
+        shape.at_many(&places, &mut bounds);
+        for ((&p, &together), &bounds) in places.iter().zip(&together).zip(&bounds) {
+            assert_eq!(value(&shape, p).to_bits(), together.to_bits(), "at {p}");
+            assert_eq!(shape.at(p), bounds, "at {p}");
+            assert!(bounds.width() <= 2.0 * shape.noise(), "{bounds:?} at {p}");
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_at_many_places() {
+    let mut random = Random::new(9);
+    let round: fn(DVec3) -> f64 = |p| p.length() - 1.0;
+    let ring: fn(DVec3) -> f64 = |p| DVec3::new(p.x.hypot(p.y) - 1.0, p.z, 0.0).length() - 0.4;
+    // A formula that is steep in one place and level in another has the same surface.
+    let [x, ..] = axes();
+    let uneven = (ball() + 0.0) * (x.unary(Unary::Exponential));
+    let judged = [(ball(), cube(1.5), round), (uneven, cube(1.5), round), (torus(1.0, 0.4), cube(1.7), ring)];
+    for (expression, domain, judge) in judged {
+        let shape = shape(&expression, domain);
+        let mut places = points(&mut random, &domain.grow(0.5), 30_000);
+        places.extend(lattices(&mut random, &domain, 80));
+        let mut bounds = vec![Interval::ALL; places.len()];
+        shape.at_many(&places, &mut bounds);
+        for (&p, bounds) in places.iter().zip(&bounds) {
+            let truth = judge(p);
+            assert!(bounds.widen(1e-14 * (1.0 + p.length())).contains(truth), "{bounds:?} at {p} does not hold {truth:?}");
+        }
+    }
+}
+
+#[test]
+fn next_to_a_rim_the_surface_is_somewhere() {
+    let mut random = Random::new(10);
+    for half in [PI, 2.5, 3.0, 1.0] {
+        let (domain, gyroid) = (cube(half), shape(&gyroid(), cube(half)));
+        for _ in 0..4000 {
+            // Next to a face or an edge of the domain, on either side of it.
+            let mut p = random.within(&domain);
+            for _ in 0..=random.between(0.0, 2.0) as usize {
+                let axis = random.between(0.0, 3.0) as usize % 3;
+                p[axis] = half.copysign(p[axis]) + random.between(-1.0, 1.0) * random.length(1e-12, 1e-1);
+            }
+            let at = gyroid.at(p);
+            assert!(at.width() <= 2.0 * gyroid.noise(), "{at:?} at {p}");
+        }
+    }
+}
+
+#[test]
+fn bends_hold_second_differences_of_many_cells() {
+    let mut random = Random::new(11);
+    let shapes = [(shape(&ball(), cube(1.5)), 1.4), (shape(&torus(1.0, 0.4), cube(1.7)), 1.6), (shape(&gyroid(), cube(PI)), PI)];
+    for (shape, size) in &shapes {
+        for _ in 0..2500 {
+            let half = random.length(1e-2, 0.25);
+            let middle = random.within(&cube(size - half));
+            let cell = Aabb::new(middle - half, middle + half);
+            let bend = shape.bend(&cell);
+            if !(bend.lower > -1e9 || bend.upper < 1e9) {
+                continue;
+            }
+            let (p, direction) = (random.within(&Aabb::new(middle - 0.5 * half, middle + 0.5 * half)), random.direction());
+            let step = 0.5 * half;
+            let [a, b, c] = [p - direction * step, p, p + direction * step].map(|q| shape.at(q));
+            let second = Interval { lower: a.lower - 2.0 * b.upper + c.lower, upper: a.upper - 2.0 * b.lower + c.upper }.widen(1e-14);
+            let square = step * step;
+            assert!(
+                second.upper >= bend.lower * square && second.lower <= bend.upper * square,
+                "{second:?} at {p} over {cell:?}, {bend:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn building_does_not_depend_on_threads() {
     let mut random = Random::new(7);

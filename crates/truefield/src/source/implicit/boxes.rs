@@ -142,6 +142,31 @@ impl Boxes {
         Ok(self)
     }
 
+    /// The root, if there is one.
+    pub(super) fn root(&self) -> &[u32] {
+        if self.nodes.is_empty() { &[] } else { &[0] }
+    }
+
+    /// The leaves that are not farther from `cell` than `reach`; `None` where they are more than `most`.
+    pub(super) fn leaves_near(&self, cell: &Aabb, reach: f64, most: usize) -> Option<Vec<u32>> {
+        let (mut leaves, mut pending) = (Vec::new(), self.root().to_vec());
+        while let Some(index) = pending.pop() {
+            let node = &self.nodes[index as usize];
+            let apart = (node.extent.min - cell.max).max(cell.min - node.extent.max).max(DVec3::ZERO).length();
+            if apart > reach * (1.0 + 1e-14) {
+                continue;
+            }
+            if node.count == 0 {
+                leaves.push(index);
+            }
+            pending.extend(node.first..node.first + u32::from(node.count));
+            if leaves.len() > most {
+                return None;
+            }
+        }
+        Some(leaves)
+    }
+
     /// How well the surface near `cell` is known: the worst of the leaves that are not farther from it than `reach`.
     pub(super) fn known_near(&self, cell: &Aabb, reach: f64) -> f64 {
         let mut worst = 0.0_f32;

@@ -60,6 +60,10 @@ fn wave(of: Interval, crest: f64, function: impl Fn(f64) -> f64) -> Interval {
     if !(of.width() < TAU) {
         return Interval { lower: -1.0, upper: 1.0 };
     }
+    if of.lower == of.upper {
+        let value = function(of.lower);
+        return ordered(library_down(value).max(-1.0), library_up(value).min(1.0));
+    }
     let ends = [of.lower, of.upper].map(&function);
     let upper = if may_meet(of, crest, TAU) { 1.0 } else { library_up(ends[0].max(ends[1])).min(1.0) };
     let lower = if may_meet(of, crest - PI, TAU) { -1.0 } else { library_down(ends[0].min(ends[1])).max(-1.0) };

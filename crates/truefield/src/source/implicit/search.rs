@@ -87,6 +87,8 @@ pub(super) struct Search<'a> {
     proven: Vec<Aabb>,
     /// Feet around which that was tried.
     feet: Vec<DVec3>,
+    /// The first box that was looked into.
+    first: Option<Aabb>,
 }
 
 impl<'a> Search<'a> {
@@ -94,13 +96,13 @@ impl<'a> Search<'a> {
     pub(super) fn new(tape: &'a Tape, domain: &'a Aabb, boxes: &'a Boxes, accuracy: Accuracy, p: DVec3, side: Side, limit: f64) -> Self {
         let (heap, pieces, proven, feet) = (BinaryHeap::new(), Vec::new(), Vec::new(), Vec::new());
         let (floor, upper) = (f64::INFINITY, limit);
-        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, floor, upper, foot: None, proven, feet }
+        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, floor, upper, foot: None, proven, feet, first: None }
     }
 
-    /// Searches.
-    pub(super) fn run(mut self) -> Found {
-        if !self.boxes.nodes.is_empty() {
-            self.enter(0.0, Place::Node(0));
+    /// Searches the tree from these nodes on.
+    pub(super) fn run(mut self, nodes: &[u32]) -> Found {
+        for &node in nodes {
+            self.open(node);
         }
         while let Some(Waiting { bound, item, .. }) = self.heap.pop() {
             if bound >= self.upper * self.upper {
@@ -128,6 +130,10 @@ impl<'a> Search<'a> {
                     self.settle(bound, &piece);
                 }
             }
+        }
+        // Next to a rim of the domain, the other side may lie off the slope of the formula.
+        if let Some(first) = self.first.filter(|_| self.upper == f64::INFINITY) {
+            self.scan(&first);
         }
         // Rounding of points and of what was subtracted from them.
         let rounding = 4.0 * f64::EPSILON * (self.p.abs().max_element() + self.domain.min.abs().max(self.domain.max.abs()).max_element());
@@ -186,6 +192,7 @@ impl<'a> Search<'a> {
         if self.is_proven(extent) {
             return;
         }
+        self.first.get_or_insert(*extent);
         let size = extent.size().max_element();
         if let Some((_, sheet, near)) = &piece.sheet {
             if (piece.fresh || self.upper == f64::INFINITY) && self.prove(sheet, *near) {

@@ -10,6 +10,18 @@ use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
+/// Points that are asked together, the fewest for which leaves are looked for, and the most leaves for which that pays.
+const GROUP: usize = 64;
+const FEW: usize = 8;
+const LEAVES: usize = 96;
+
+/// The leaves that can be nearest to some of a group of points.
+struct Near {
+    leaves: Vec<u32>,
+    /// All others are farther from each of the points.
+    reach: f64,
+}
+
 /// The part of a domain where a formula is negative, with its true distance.
 ///
 /// The domain bounds the solid: where the formula is negative on a face of the domain, the face is surface, so that the
@@ -71,7 +83,28 @@ impl Implicit {
     pub(super) fn search(&self, p: DVec3, side: Side) -> Found {
         // The faces of the domain are surface to what is inside.
         let limit = if side == Side::Inside { self.depth(p) } else { f64::INFINITY };
-        Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run()
+        Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run(self.boxes.root())
+    }
+
+    /// [`Self::search`] among the leaves that are near, with the same result.
+    fn search_near(&self, p: DVec3, side: Side, near: Option<&Near>) -> Found {
+        let Some(near) = near else { return self.search(p, side) };
+        let limit = if side == Side::Inside { self.depth(p) } else { f64::INFINITY };
+        let found = Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run(&near.leaves);
+        // All other leaves are farther than what was found, or all have to be looked at.
+        if found.upper < near.reach { found } else { self.search(p, side) }
+    }
+
+    /// The leaves that can be nearest to some of many points; `None` where these are too many, or nothing is gained.
+    fn near(&self, points: &[DVec3]) -> Option<Near> {
+        if points.len() < FEW || self.boxes.rough || !points.iter().all(|p| p.is_finite()) {
+            return None;
+        }
+        let around = Aabb::around(points.iter().copied());
+        let center = around.center();
+        let side = Side::of(self.tape.certain(center.clamp(self.domain.min, self.domain.max)))?;
+        let reach = self.search(center, side).upper + around.radius() * (1.0 + 1e-12) + self.accuracy.hard;
+        Some(Near { leaves: self.boxes.leaves_near(&around, reach, LEAVES)?, reach })
     }
 
     pub(super) fn tape(&self) -> &Tape {
@@ -116,7 +149,7 @@ impl Implicit {
     }
 
     /// What is known of the distance, and the number that fields sample.
-    fn answer(&self, p: DVec3) -> (Interval, f64) {
+    fn answer(&self, p: DVec3, near: Option<&Near>) -> (Interval, f64) {
         if !p.is_finite() {
             return (Interval::ALL, f64::NAN);
         }
@@ -135,7 +168,7 @@ impl Implicit {
         if side == Side::Inside && apart > 0.0 {
             return (Interval::around(apart, rounding), apart);
         }
-        let Found { mut lower, mut upper, .. } = self.search(p, side);
+        let Found { mut lower, mut upper, .. } = self.search_near(p, side, near);
         if side == Side::Inside {
             let depth = self.depth(p);
             (lower, upper) = (lower.min(depth - rounding).max(0.0), upper.min(depth + rounding));
@@ -158,18 +191,30 @@ impl Distance for Implicit {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        self.answer(p).0
+        self.answer(p, None).0
+    }
+
+    fn at_many(&self, points: &[DVec3], out: &mut [Interval]) {
+        for (points, out) in points.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
+            let near = self.near(points);
+            for (&p, out) in points.iter().zip(out) {
+                *out = self.answer(p, near.as_ref()).0;
+            }
+        }
     }
 }
 
 impl Source for Implicit {
     fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
-        for (&p, out) in points.iter().zip(out) {
-            *out = self.answer(p).1;
-            if out.is_nan() || self.tape.value(p.clamp(self.domain.min, self.domain.max)).is_nan() {
-                return Err(Error::invalid(format!(
-                    "the expression is not a number at {p}; give a domain in which its roots, logarithms and quotients are defined"
-                )));
+        for (points, out) in points.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
+            let near = self.near(points);
+            for (&p, out) in points.iter().zip(out) {
+                *out = self.answer(p, near.as_ref()).1;
+                if out.is_nan() || self.tape.value(p.clamp(self.domain.min, self.domain.max)).is_nan() {
+                    return Err(Error::invalid(format!(
+                        "the expression is not a number at {p}; give a domain in which its roots, logarithms and quotients are defined"
+                    )));
+                }
             }
         }
         Ok(())
@@ -183,9 +228,11 @@ impl Source for Implicit {
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {
-        let (at, value) = self.answer(cell.center());
+        let (at, value) = self.answer(cell.center(), None);
         let radius = cell.radius() * (1.0 + 1e-15);
         let near = at.upper.max(-at.lower) + radius;
+        // Where bounds meet, the value is their middle and less than the noise from the distance. Elsewhere it is how far a
+        // box is that may hold surface: `known` says how much farther the surface is than any point of such a box.
         let error = self.boxes.known_near(cell, near) + 2.0 * self.noise();
         // Both change by no more than one moves.
         let moved = 2.0 * radius + self.noise();
