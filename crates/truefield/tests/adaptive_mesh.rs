@@ -8,7 +8,7 @@ use nasty::{corpus, shapes};
 use truefield::build::adaptive::{Leaves, Rule, Rules, adaptive, adaptive_mesh, root};
 use truefield::field::adaptive::{AdaptiveField, Division, Leaf};
 use truefield::laws::{Random, places};
-use truefield::{Aabb, Distance, Run, SignChoice, Surface, TriangleMesh};
+use truefield::{Aabb, DVec3, Distance, Run, SignChoice, Surface, TriangleMesh};
 
 fn surface(mesh: TriangleMesh) -> Arc<Surface> {
     Arc::new(Surface::new(Arc::new(mesh), SignChoice::Auto, &Run::with_threads(2)).expect("a surface"))
@@ -96,6 +96,18 @@ fn bounds_hold_close_to_smooth_sharp_and_rough_surfaces() {
         for (rule, growth) in [(Rule::Verified, 0.0), (Rule::Verified, 0.05), (Rule::Samples, 0.05)] {
             let rules = rules(&surface, 2e-3, 7, growth, rule);
             holds(name, &build(&surface, Leaves::Linear, &rules, 2), &surface, &rules, 60_000);
+        }
+    }
+}
+
+#[test]
+fn bounds_hold_where_normals_lean_as_far_as_they_are_relied_on() {
+    for steep in [0.2, 1.0, 3.0, 10.0] {
+        let stretched = shapes::scan(24, 24, 5).into_iter().map(|triangle| triangle.map(|p| p * DVec3::new(1.0, 1.0, steep)));
+        let surface = surface(shapes::welded(&stretched.collect::<Vec<_>>()));
+        for (tolerance, max_depth) in [(3e-3, 6), (2e-2, 5)] {
+            let rules = rules(&surface, tolerance, max_depth, 0.05, Rule::Verified);
+            holds("a stretched scan", &build(&surface, Leaves::Linear, &rules, 2), &surface, &rules, 40_000);
         }
     }
 }

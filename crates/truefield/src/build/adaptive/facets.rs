@@ -342,3 +342,66 @@ fn hull(values: [f64; 8]) -> Interval {
 fn signed(side: Side, unsigned: Interval) -> Interval {
     if side.sign() < 0.0 { Interval { lower: -unsigned.upper, upper: -unsigned.lower } } else { unsigned }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::Random;
+
+    fn interpolate(numbers: &[f64; 8], at: DVec3) -> f64 {
+        let weight = |j: usize, axis: usize| if j >> axis & 1 == 1 { at[axis] } else { 1.0 - at[axis] };
+        (0..8).map(|j| numbers[j] * weight(j, 0) * weight(j, 1) * weight(j, 2)).sum()
+    }
+
+    #[test]
+    fn two_slopes_that_meet_cost_as_much_as_their_kink() {
+        for (p, q) in [(1.0, 1.0), (0.25, 3.0), (1e-6, 1.0)] {
+            let rows = [[0.0, q, 0.0, q, 0.0, q, 0.0, q], [p, 0.0, p, 0.0, p, 0.0, p, 0.0]];
+            let bound = mixed(&rows, f64::NEG_INFINITY);
+            assert!((bound - p * q / (p + q)).abs() <= 1e-12 * p, "{p} {q}: {bound}");
+        }
+    }
+
+    #[test]
+    fn means_bound_the_least_of_all_rows_and_are_no_worse_than_any() {
+        let mut random = Random::new(5);
+        for case in 0..3000 {
+            let zeros = random.unit();
+            let count = 1 + random.below(9);
+            let rows: Vec<[f64; 8]> =
+                (0..count).map(|_| std::array::from_fn(|_| if random.unit() < zeros { 0.0 } else { random.between(-0.2, 1.0) })).collect();
+            let bound = mixed(&rows, f64::NEG_INFINITY);
+            let plain = rows.iter().map(|row| ends(row).1).fold(f64::INFINITY, f64::min);
+            assert!(bound <= plain, "{case}: {bound} and {plain}");
+            for _ in 0..50 {
+                let at = DVec3::new(random.unit(), random.unit(), random.unit());
+                let least = rows.iter().map(|row| interpolate(row, at)).fold(f64::INFINITY, f64::min);
+                assert!(least <= bound + 1e-12, "{case}: {least} at {at}, {bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn feet_bound_the_distance_to_any_cloud_between_what_is_told() {
+        let mut random = Random::new(7);
+        for case in 0..500 {
+            let size = random.length(1e-2, 10.0);
+            let cloud: Vec<DVec3> = (0..1 + random.below(20)).map(|_| random.direction() * random.between(0.5, 2.0)).collect();
+            let nearest = |p: DVec3| cloud.iter().map(|q| (p - q).length()).fold(f64::INFINITY, f64::min);
+            let cell = Aabb::new(DVec3::splat(-0.5 * size), DVec3::splat(0.5 * size));
+            let corners: [Corner; 8] = std::array::from_fn(|j| {
+                let point = cell.corner(j);
+                let foot = *cloud.iter().min_by(|a, b| (point - **a).length().total_cmp(&(point - **b).length())).expect("a point");
+                Corner { value: nearest(point), certain: true, point, foot, near: Slot(0) }
+            });
+            let told = corners.map(|corner| corner.value + random.between(-0.01, 0.01));
+            let feet = std::array::from_fn(|k| corners[k % 8].foot);
+            let bound = above_feet(&corners, &feet, &told, f64::NEG_INFINITY);
+            for _ in 0..100 {
+                let at = DVec3::new(random.unit(), random.unit(), random.unit());
+                let found = nearest(cell.min + cell.size() * at) - interpolate(&told, at);
+                assert!(found <= bound + 1e-12 * size, "{case}: {found} at {at}, {bound}");
+            }
+        }
+    }
+}
