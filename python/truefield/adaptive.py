@@ -106,7 +106,11 @@ class AdaptiveField:
     def bounds(
         self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None
     ) -> tuple[Floats, Floats]:
-        """Lower and upper bounds, (n,) float64 each, of the true signed distances; outside the domain too."""
+        """Lower and upper bounds, (n,) float64 each, of the true signed distances; outside the domain too.
+
+        There, of a field whose domain holds the whole solid, by a search for the nearest cell that may hold surface:
+        about as near as the tolerance, many times as dear as a question inside.
+        """
         return self._native.bounds(arguments.points(points), threads, progress)
 
     def gradient(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Floats:

@@ -12,9 +12,10 @@ known, with its `length` (null: infinite): "exact" within a band, "error" of eve
 `continuous`: whether the sign changes at the surface only. Its arrays are flat, x slowest: the numbers of `doubtful`
 samples, `values`, `lower` and `upper` (empty but for "bounds").
 
-An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4),
-`continuous`, `tolerance`, `growth` (null: infinite), `max_depth` and `rule` that edits go on to ask, the number of
-`levels`, `sign_rule` of the mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles`
+An adaptive field's header has `kind` "adaptive", `extent` of the root cell, `children` of a cell (8 or 4), `coverage`:
+"whole" where the domain holds all of the solid, or "unknown" (also where it is not said), `continuous`, `tolerance`,
+`growth` (null: infinite), `max_depth` and `rule` that edits go on to ask, the number of `levels`, `sign_rule` of the
+mesh (null where there is none), and `sums`. Its arrays: `vertices` and `mesh_triangles`
 of the mesh whose triangles exact leaves name; `edits`, 16 numbers each, as `crates/truefield-python/src/edit.rs` has
 them; then, for each level n from the root down, `records_n`, ten numbers for each cell (the values at its corners,
 lower and upper error), `cubics_n`, 64 for each tricubic leaf, `ends_n`, `triangles_n` and `sides_n` of the lists of
@@ -212,6 +213,7 @@ def _adaptive(header: Header, arrays: Arrays, threads: int | None, progress: Pro
     names = ("extent", "children", "continuous", "tolerance", "max_depth", "rule")
     growth = np.inf if header["growth"] is None else header["growth"]
     about = {name: header[name] for name in names} | {"growth": growth, "edits": arrays["edits"]}
+    about["coverage"] = header.get("coverage", "unknown")
     read = sum(name.startswith("records_") for name in arrays)
     levels = [{name: arrays[f"{name}_{number}"] for name in _LEVEL} for number in range(read)]
     return AdaptiveField(_truefield.adaptive_field_from_levels(about, levels, surface, threads, progress))
@@ -250,6 +252,8 @@ def _checked(header: Header) -> Mapping[str, Kept]:
         )
         expect(header, "children", lambda children: children in (4, 8))
         expect(header, "continuous", lambda continuous: isinstance(continuous, bool))
+        if "coverage" in header:
+            expect(header, "coverage", lambda coverage: coverage in ("whole", "unknown"))
         expect(header, "tolerance", lambda tolerance: isinstance(tolerance, float))
         expect(header, "growth", lambda growth: growth is None or isinstance(growth, float))
         expect(header, "max_depth", lambda depth: type(depth) is int and 0 <= depth < _MOST_LEVELS)

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use truefield::build::adaptive::{Rules, coalesce};
 use truefield::field::adaptive::{
-    Accuracy, AdaptiveField, Change, Division, Edit, Edits, Level, LevelKind, Levels, ListSide, Lists, Record, Root,
+    Accuracy, AdaptiveField, Change, Coverage, Division, Edit, Edits, Level, LevelKind, Levels, ListSide, Lists, Record, Root,
 };
 use truefield::op::edit::{Operation, edit};
 use truefield::op::level_of_detail::{Detail, level_of_detail};
@@ -119,6 +119,7 @@ pub fn levels_of<'py>(
     about.set_item("extent", [levels.root.extent.min.to_array(), levels.root.extent.max.to_array()])?;
     about.set_item("children", levels.root.division.children())?;
     about.set_item("continuous", levels.continuity == Continuity::Everywhere)?;
+    about.set_item("coverage", coverage_name(levels.coverage))?;
     about.set_item("tolerance", levels.accuracy.tolerance)?;
     about.set_item("growth", levels.accuracy.growth)?;
     about.set_item("max_depth", levels.accuracy.max_depth)?;
@@ -162,6 +163,7 @@ pub fn field_of_levels(
         rule: crate::adaptive::rule(&said::<String>(about, "rule")?)?,
     };
     let mut all = Levels::new(root, continuity, accuracy);
+    all.coverage = coverage(&said::<String>(about, "coverage")?)?;
     let edits: Vec<f64> = array(about, "edits")?;
     all.edits = Edits::new(edits.chunks(EDIT).map(read).collect::<truefield::Result<_>>().map_err(raise)?);
     for level in levels.iter() {
@@ -222,6 +224,21 @@ fn read(row: &[f64]) -> truefield::Result<Edit> {
     let change = if row[0] == 1.0 { Change::Grown } else { Change::Shrunk };
     let anchor = Some(corner(4)).filter(|anchor| !anchor.is_nan());
     Ok(Edit { change, extent: Aabb::new(corner(0), corner(1)), reach: Aabb::new(corner(2), corner(3)), anchor })
+}
+
+fn coverage_name(coverage: Coverage) -> &'static str {
+    match coverage {
+        Coverage::Whole => "whole",
+        Coverage::Unknown => "unknown",
+    }
+}
+
+fn coverage(name: &str) -> PyResult<Coverage> {
+    match name {
+        "whole" => Ok(Coverage::Whole),
+        "unknown" => Ok(Coverage::Unknown),
+        _ => Err(damaged("what it says of its domain is no known word")),
+    }
 }
 
 fn damaged(what: &str) -> PyErr {

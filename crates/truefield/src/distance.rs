@@ -1,7 +1,7 @@
 //! The question every source and field answers.
 
 use crate::error::Result;
-use crate::geom::{Aabb, DVec3, Interval, Nearest};
+use crate::geom::{Aabb, Affine, DVec3, Interval, Nearest};
 
 /// Anything that can be asked how far it is. Distances are in model units, negative inside.
 pub trait Distance: Send + Sync {
@@ -14,6 +14,13 @@ pub trait Distance: Send + Sync {
     /// The range of distances over a box; the default uses that distances are 1-Lipschitz.
     fn over(&self, cell: &Aabb) -> Interval {
         self.at(cell.center()).widen(cell.radius() * (1.0 + 1e-15))
+    }
+
+    /// An affine function that is nowhere in the box above the distance; the default's is the least distance.
+    ///
+    /// Over a box at some way from a flat or convex surface, it tells much more than the least distance does.
+    fn below(&self, cell: &Aabb) -> Affine {
+        Affine::constant(self.over(cell).lower)
     }
 
     /// [`Distance::at`] for many points; `out` is as long as `points`.

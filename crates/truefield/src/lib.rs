@@ -24,7 +24,7 @@ pub mod source;
 pub use distance::{Closest, Distance, SampleBlock, Source};
 pub use error::{Error, Result};
 pub use field::{CompleteField, Continuity, Known, Parts, SampledField};
-pub use geom::{Aabb, DVec3, Feature, Interval, Nearest};
+pub use geom::{Aabb, Affine, DVec3, Feature, Interval, Nearest};
 pub use grid::Grid;
 pub use lattice::Lattice;
 pub use mesh::TriangleMesh;

@@ -1,11 +1,13 @@
 //! Points, boxes, intervals and triangles: pure and allocation-free.
 
 mod aabb;
+mod affine;
 mod facet;
 mod interval;
 mod overlap;
 
 pub use aabb::Aabb;
+pub use affine::Affine;
 pub use facet::{Facet, FacetPoint};
 pub use glam::DVec3;
 pub use interval::Interval;

@@ -3,12 +3,16 @@
 //! Let m be the least of max(f, g) over all points, f and g the signed distances of the solids. If m > 0 they are apart, and
 //! the way from one to the other is 2 m: its middle is m from both, and no point is nearer than m to both, or the way by it
 //! would be shorter. If m < 0 they overlap, and a ball of radius -m about the deepest common point lies in both.
+//!
+//! In a box, the greater of f and g is nowhere less than any mean of both. Where each is bounded by an affine function, the best
+//! mean is found among a few: across a gap the slopes are opposite and cancel, so that large boxes tell how wide it is.
 
 use std::collections::BinaryHeap;
 
+use super::clearance::{Patience, clearance};
 use crate::distance::Distance;
 use crate::error::{Error, Result};
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
 use crate::run::Run;
 use crate::source::waiting::Waiting;
 
@@ -17,6 +21,9 @@ const BATCH: usize = 64;
 
 /// Steps that lead to a witness on a surface.
 const STEPS: usize = 60;
+
+/// Halvings of a way that crosses a surface.
+const HALVINGS: usize = 40;
 
 /// What is certain of two solids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,71 +55,99 @@ pub struct Collision {
 /// Finds how two solids lie to each other, to `tolerance`, asking about no more than `budget` boxes.
 ///
 /// The interval contains the truth however early the search ends, and is no wider than `tolerance` where the budget was enough
-/// and the solids are exact. Where surfaces run in parallel, the number of boxes grows with the square of their size over the
+/// and the solids are exact; where they leave more open, it ends when asking on tells no more. Where surfaces run in parallel, the number of boxes grows with the square of their size over the
 /// tolerance. Refuses two solids without an end, and a tolerance that is no positive length.
 pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize, run: &Run<'_>) -> Result<Collision> {
     if !(tolerance > 0.0 && tolerance.is_finite()) {
         return Err(Error::invalid(format!("the tolerance is {tolerance}; give a positive length")));
     }
     let start = domain(f, g)?;
-    let ask = |extent: Aabb| {
-        let center = extent.center();
-        let (a, b) = (f.at(center), g.at(center));
-        let over = Interval { lower: f.over(&extent).lower.max(g.over(&extent).lower), upper: f64::INFINITY };
-        // Each distance at the middle bounds it in the whole box, too.
-        (over.lower, a.upper.max(b.upper), a.upper.max(0.0) + b.upper.max(0.0), center)
-    };
-    let (lower, upper, sum, center) = ask(start);
-    let mut best = Best { upper, at: center, sum };
-    let mut heap = BinaryHeap::from([Waiting { bound: lower, number: 0, item: start }]);
-    let mut boxes = 1;
+    let mut best = Best { upper: f64::INFINITY, at: start.center(), sum: f64::INFINITY, between: start.center() };
+    let first = Asked::of(f, g, &start, best.least());
+    best.offer(&first);
+    let mut heap = BinaryHeap::from([Waiting { bound: first.lower, number: 0, item: start }]);
+    let (mut boxes, mut patience) = (1, Patience::default());
+    let apart = clearance(f, g, &start, tolerance, budget / 2, run)?;
+    boxes = boxes.max(apart.boxes);
+    best.offer_way(apart.upper, apart.at);
+    if apart.lower > 0.0 {
+        let known = Interval { lower: apart.lower.min(best.sum), upper: best.sum };
+        return Ok(best.collision(f, g, known, &start, boxes));
+    }
     loop {
-        let floor = heap.peek().map_or(best.upper, |first| first.bound).min(best.upper);
+        let floor = heap.peek().map_or(best.least(), |first| first.bound).min(best.least());
         let known = best.separation(floor);
         run.progress.report("search for contact", boxes.min(budget), budget);
         // Half of it, since a way is twice the least.
-        if known.width() <= tolerance || boxes >= budget || heap.is_empty() {
+        if known.width() <= tolerance || boxes >= budget || heap.is_empty() || patience.ends(boxes, known.width()) {
             return Ok(best.collision(f, g, known, &start, boxes));
         }
         let mut batch = Vec::with_capacity(8 * BATCH);
         while batch.len() < 8 * BATCH
             && let Some(candidate) = heap.pop()
         {
-            if candidate.bound > best.upper {
+            if candidate.bound > best.least() {
                 heap.clear();
                 break;
             }
-            let (low, middle, high) = (candidate.item.min, candidate.item.center(), candidate.item.max);
-            // Along sides that can still be divided.
-            let fine = !(middle.cmpgt(low).any() && middle.cmplt(high).any());
-            if fine {
+            let Some(parts) = octants(&candidate.item) else {
                 heap.push(candidate);
                 break;
-            }
-            let halves = Aabb::new(low, middle);
-            for corner in 0..8 {
-                let shift = DVec3::from_array(std::array::from_fn(|axis| f64::from(corner as u8 >> axis & 1)));
-                let min = low + (middle - low) * shift;
-                batch.push(Aabb::new(min, if corner == 7 { high } else { min + halves.size() }));
-            }
+            };
+            batch.extend(parts);
         }
         if batch.is_empty() {
             return Ok(best.collision(f, g, known, &start, boxes));
         }
         let found = run.blocks("search for contact", batch.len().div_ceil(8), |block| {
-            Ok(batch[8 * block..(8 * block + 8).min(batch.len())].iter().map(|&extent| ask(extent)).collect::<Vec<_>>())
+            let extents = &batch[8 * block..(8 * block + 8).min(batch.len())];
+            Ok(extents.iter().map(|extent| Asked::of(f, g, extent, best.least())).collect::<Vec<_>>())
         })?;
-        for (&extent, (lower, upper, sum, center)) in batch.iter().zip(found.into_iter().flatten()) {
-            if upper < best.upper {
-                (best.upper, best.at) = (upper, center);
-            }
-            best.sum = best.sum.min(sum);
-            if lower <= best.upper {
-                heap.push(Waiting { bound: lower, number: boxes, item: extent });
+        for (&extent, asked) in batch.iter().zip(found.into_iter().flatten()) {
+            best.offer(&asked);
+            if asked.lower <= best.least() {
+                heap.push(Waiting { bound: asked.lower, number: boxes, item: extent });
             }
             boxes += 1;
         }
     }
+}
+
+/// What is known of a box.
+struct Asked {
+    /// No more than max(f, g) anywhere in it.
+    lower: f64,
+    center: DVec3,
+    /// No less than max(f, g) in the middle.
+    upper: f64,
+    /// No less than the way from one solid to the other by the middle.
+    sum: f64,
+}
+
+impl Asked {
+    /// Asks no more than is needed to see that a box has nothing below `enough`.
+    fn of(f: &dyn Distance, g: &dyn Distance, extent: &Aabb, enough: f64) -> Self {
+        let center = extent.center();
+        let (a, b) = (f.at(center), g.at(center));
+        let mut lower = a.lower.max(b.lower) - extent.radius() * (1.0 + 1e-15);
+        if lower <= enough {
+            lower = lower.max(f.over(extent).lower).max(g.over(extent).lower);
+        }
+        if lower <= enough {
+            lower = lower.max(least_of_greater(&f.below(extent), &g.below(extent), 0.5 * extent.size()));
+        }
+        Self { lower, center, upper: a.upper.max(b.upper), sum: a.upper.max(0.0) + b.upper.max(0.0) }
+    }
+}
+
+/// No more than the greater of two affine functions anywhere in a box of these half edges: the best that their means tell.
+fn least_of_greater(f: &Affine, g: &Affine, half: DVec3) -> f64 {
+    // The least of a mean is concave in its parts, with kinks where a slope vanishes.
+    let kinks = f.slope / (f.slope - g.slope);
+    let parts = [0.0, 1.0].into_iter().chain(kinks.to_array().into_iter().filter(|part| (0.0..=1.0).contains(part)));
+    let least = parts.map(|part| f.mix(g, part).least(half)).fold(f64::NEG_INFINITY, f64::max);
+    // For rounding.
+    least - 1e-14 * (f.value.abs() + g.value.abs() + half.length())
 }
 
 /// The best of all points asked.
@@ -122,9 +157,29 @@ struct Best {
     at: DVec3,
     /// Least upper end of the way through one point.
     sum: f64,
+    between: DVec3,
 }
 
 impl Best {
+    fn offer(&mut self, asked: &Asked) {
+        if asked.upper < self.upper {
+            (self.upper, self.at) = (asked.upper, asked.center);
+        }
+        self.offer_way(asked.sum, asked.center);
+    }
+
+    /// Takes a way from one solid to the other by a point.
+    fn offer_way(&mut self, sum: f64, by: DVec3) {
+        if sum < self.sum {
+            (self.sum, self.between) = (sum, by);
+        }
+    }
+
+    /// No less than the least of max(f, g): half of a way, too.
+    fn least(&self) -> f64 {
+        self.upper.min(0.5 * self.sum)
+    }
+
     /// What is known of the separation, if max(f, g) is nowhere below `floor`.
     fn separation(&self, floor: f64) -> Interval {
         let lower = if floor > 0.0 { 2.0 * floor } else { floor };
@@ -142,7 +197,7 @@ impl Best {
         };
         let (first, second) = if contact == Contact::Separated {
             let step = 1e-6 * start.diagonal();
-            (foot(f, self.at, step), foot(g, self.at, step))
+            (foot(f, self.between, step, STEPS), foot(g, self.between, step, STEPS))
         } else {
             (self.at, self.at)
         };
@@ -151,20 +206,27 @@ impl Best {
 }
 
 /// A point of the surface, by going against the slope as far as the distance says.
-fn foot(f: &dyn Distance, from: DVec3, step: f64) -> DVec3 {
+pub(super) fn foot(f: &dyn Distance, from: DVec3, step: f64, steps: usize) -> DVec3 {
     let value = |p: DVec3| {
         let known = f.at(p);
         0.5 * known.lower + 0.5 * known.upper
     };
     let (mut at, mut distance) = (from, value(from));
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         if distance.abs() < 1e-3 * step {
             break;
         }
         let slope = |axis: DVec3| value(at + axis * step) - value(at - axis * step);
-        let Some(direction) = DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).try_normalize() else { break };
+        // What fields know needs no steps, which their errors would spoil.
+        let known = f.below(&Aabb::new(at, at)).slope.try_normalize();
+        let steps = || DVec3::new(slope(DVec3::X), slope(DVec3::Y), slope(DVec3::Z)).try_normalize();
+        let Some(direction) = known.or_else(steps) else { break };
         let next = at - direction * distance;
         let there = value(next);
+        if (there < 0.0) != (distance < 0.0) && there.abs() > step {
+            // Beyond an edge: the surface lies on the way.
+            return crossing(&value, at, next);
+        }
         // On a ridge the slope tells little: half the way is enough.
         (at, distance) = if there.abs() < distance.abs() {
             (next, there)
@@ -173,6 +235,36 @@ fn foot(f: &dyn Distance, from: DVec3, step: f64) -> DVec3 {
         };
     }
     at
+}
+
+/// Where a value changes its sign between two points, by halving.
+fn crossing(value: &impl Fn(DVec3) -> f64, from: DVec3, to: DVec3) -> DVec3 {
+    let (mut low, mut high) = (0.0, 1.0);
+    let inside = value(from) < 0.0;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if (value(from.lerp(to, middle)) < 0.0) == inside {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    from.lerp(to, high)
+}
+
+/// The eight parts of a box; `None` where it is too small to be divided.
+pub(super) fn octants(extent: &Aabb) -> Option<[Aabb; 8]> {
+    let (low, middle, high) = (extent.min, extent.center(), extent.max);
+    // Along sides that can still be divided.
+    (middle.cmpgt(low).any() && middle.cmplt(high).any()).then(|| {
+        std::array::from_fn(|corner| {
+            let upper = |axis: usize| corner >> axis & 1 == 1;
+            let pick = |of_upper: DVec3, of_lower: DVec3| {
+                DVec3::from_array(std::array::from_fn(|axis| if upper(axis) { of_upper[axis] } else { of_lower[axis] }))
+            };
+            Aabb::new(pick(middle, low), pick(high, middle))
+        })
+    })
 }
 
 /// A box that holds a point where max(f, g) is least.

@@ -1,5 +1,6 @@
 //! What people want from a field or a mesh.
 
+mod clearance;
 pub mod collide;
 pub mod contour;
 pub mod dual;

@@ -15,7 +15,7 @@ use crate::bvh::descend::Block;
 use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::field::adaptive::{AdaptiveField, Division, Level, LevelKind, Levels, ListSide, Record, Root};
+use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind, Levels, ListSide, Record, Root};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::grid::Grid;
 use crate::run::Run;
@@ -105,7 +105,8 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
             cells.push(builder.inner(above, index));
         }
     }
-    let mut levels = assemble(&cells, Levels::new(root, continuity, rules.accuracy()));
+    let coverage = Coverage::of(&root, Some(surface.mesh().extent()));
+    let mut levels = assemble(&cells, Levels { coverage, ..Levels::new(root, continuity, rules.accuracy()) });
     drop(cells);
     levels.derive_errors();
     AdaptiveField::from_levels(&levels, (leaves == Leaves::Exact).then(|| Arc::clone(surface)), run)

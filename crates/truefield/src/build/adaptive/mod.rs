@@ -13,7 +13,7 @@ pub(crate) mod verify;
 use crate::distance::{SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::field::adaptive::{Accuracy, AdaptiveField, Division, Level, LevelKind, Levels, MAX_DEPTH, Record, Root};
+use crate::field::adaptive::{Accuracy, AdaptiveField, Coverage, Division, Level, LevelKind, Levels, MAX_DEPTH, Record, Root};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 
@@ -141,6 +141,7 @@ pub fn adaptive(source: &dyn Source, root: Root, rules: &Rules, run: &Run<'_>) -
     let layout = Layout::new(root.division, rules.reconstruction);
     let mut levels = Levels::new(root, Continuity::Everywhere, rules.accuracy());
     let mut parents = Vec::new();
+    levels.coverage = Coverage::of(&root, source.extent());
     let mut cells = 0;
     for depth in 0.. {
         let builder = Builder { source, root, rules, layout, depth };

@@ -171,7 +171,8 @@ impl Patch<'_> {
             }
             Ok(Arc::new(page(self, portals[number], PAGE_DEPTH, &mut Vec::new())))
         })?;
-        let AdaptiveField { root, continuity, accuracy, .. } = *self.old;
+        let AdaptiveField { root, continuity, accuracy, coverage, .. } = *self.old;
+        let fresh = self.edits.list().get(self.old.edits.list().len()..).unwrap_or_default();
         Ok(AdaptiveField {
             root,
             top: Arc::new(top),
@@ -179,6 +180,7 @@ impl Patch<'_> {
             surface: self.old.surface.clone(),
             continuity,
             accuracy,
+            coverage: coverage.after(fresh, &root),
             edits: self.edits.clone(),
         })
     }

@@ -220,8 +220,13 @@ impl<'a> Cell<'a> {
 
     /// What holds in a part of the cell after all edits, where `known` held when the cell was sampled.
     #[inline]
-    fn age(&self, known: Interval, part: &Aabb) -> Interval {
+    pub(super) fn age(&self, known: Interval, part: &Aabb) -> Interval {
         if self.field.edits.list().is_empty() { known } else { self.field.edits.age(known, part, &self.extent()) }
+    }
+
+    /// Whether nothing was edited, so that nothing has to be aged.
+    pub(super) fn is_fresh(&self) -> bool {
+        self.field.edits.list().is_empty()
     }
 
     /// Unsigned distance and side by the nearest triangle of an exact leaf's point; `None` where the field has no surface.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::assemble::{Shape, Tree, page};
 use super::page::{Lists, PAGE_DEPTH, Record, Samples};
-use super::{Accuracy, AdaptiveField, Cell, Division, Edits, Leaf, MAX_DEPTH, Root, about_corners, differences};
+use super::{Accuracy, AdaptiveField, Cell, Coverage, Division, Edits, Leaf, MAX_DEPTH, Root, about_corners, differences};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
 use crate::geom::Interval;
@@ -47,6 +47,8 @@ pub struct Levels {
     pub continuity: Continuity,
     /// What was asked of it.
     pub accuracy: Accuracy,
+    /// Whether the domain holds the whole solid.
+    pub coverage: Coverage,
     /// What was changed since.
     pub edits: Edits,
     /// From the root down.
@@ -95,7 +97,7 @@ impl Level {
 impl Levels {
     /// A tree without levels yet.
     pub fn new(root: Root, continuity: Continuity, accuracy: Accuracy) -> Self {
-        Self { root, continuity, accuracy, edits: Edits::default(), levels: Vec::new() }
+        Self { root, continuity, accuracy, coverage: Coverage::Unknown, edits: Edits::default(), levels: Vec::new() }
     }
 
     /// Gives inner cells the errors that follow from their children's, where those are smaller: what children say is
@@ -199,6 +201,7 @@ impl AdaptiveField {
             surface,
             continuity: levels.continuity,
             accuracy: levels.accuracy,
+            coverage: levels.coverage,
             edits: levels.edits.clone(),
         })
     }
@@ -228,7 +231,8 @@ impl AdaptiveField {
             level.push(kind, *cell.record());
             waiting.extend((0..cell.children()).map(|octant| cell.child(octant)));
         }
-        Levels { root: self.root, continuity: self.continuity, accuracy: self.accuracy, edits: self.edits.clone(), levels }
+        let AdaptiveField { root, continuity, accuracy, coverage, .. } = *self;
+        Levels { root, continuity, accuracy, coverage, edits: self.edits.clone(), levels }
     }
 }
 

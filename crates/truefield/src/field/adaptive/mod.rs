@@ -5,13 +5,17 @@
 //! cut anywhere is a field again.
 
 mod accuracy;
+mod answer;
 mod assemble;
+mod beyond;
 mod cell;
 mod coarse;
+mod coverage;
 mod cubic;
 mod edits;
 mod levels;
 mod many;
+mod model;
 mod page;
 
 use std::sync::Arc;
@@ -21,6 +25,7 @@ pub(crate) use assemble::{Patch, Patched};
 pub(crate) use cell::aged_error;
 pub use cell::{Cell, Leaf, Root};
 pub(crate) use coarse::{about_corners, differences};
+pub use coverage::Coverage;
 pub(crate) use cubic::{bends, third as cubic_third, value as cubic_value, weights as cubic_weights};
 pub(crate) use edits::farthest;
 pub use edits::{Change, Edit, Edits};
@@ -87,6 +92,7 @@ pub struct AdaptiveField {
     surface: Option<Arc<Surface>>,
     continuity: Continuity,
     accuracy: Accuracy,
+    coverage: Coverage,
     edits: Edits,
 }
 
@@ -138,6 +144,11 @@ impl AdaptiveField {
     /// What was asked of it.
     pub fn accuracy(&self) -> Accuracy {
         self.accuracy
+    }
+
+    /// Whether the domain holds the whole solid.
+    pub fn coverage(&self) -> Coverage {
+        self.coverage
     }
 
     /// What was changed since it was built.
@@ -270,55 +281,5 @@ impl AdaptiveField {
     /// A few ulp for the places of corners and points.
     fn rounding(&self, p: DVec3) -> f64 {
         8.0 * f64::EPSILON * (p.abs().max_element() + self.root.extent.min.abs().max(self.root.extent.max.abs()).max_element())
-    }
-}
-
-impl Distance for AdaptiveField {
-    fn extent(&self) -> Option<Aabb> {
-        Some(self.root.extent)
-    }
-
-    /// From the leaf's error; outside the domain from the nearest of its points.
-    fn at(&self, p: DVec3) -> Interval {
-        let inside = p.clamp(self.root.extent.min, self.root.extent.max);
-        let Some(cell) = self.find(inside) else { return Interval::ALL };
-        let known = cell.bounds(inside);
-        let known = if matches!(cell.leaf(), Leaf::Exact(_)) { known } else { known.widen(self.rounding(p)) };
-        if inside == p {
-            return known;
-        }
-        let known = known.widen((p - inside).length() * (1.0 + 1e-12));
-        match self.continuity {
-            Continuity::Everywhere => known,
-            Continuity::ExceptOpenings => Interval::either_side(known.upper.max(-known.lower)),
-        }
-    }
-
-    fn over(&self, cell: &Aabb) -> Interval {
-        let center = self.at(cell.center()).widen(cell.radius() * (1.0 + 1e-15));
-        let inside = self.root.extent.contains(cell.min) && self.root.extent.contains(cell.max);
-        if !inside {
-            return match self.continuity {
-                Continuity::Everywhere => center,
-                Continuity::ExceptOpenings => Interval::either_side(center.upper.max(-center.lower)),
-            };
-        }
-        // Cells that are small beside the box tell no more than their parents.
-        let fine = 0.25 * cell.size().max_element();
-        let mut range: Option<Interval> = None;
-        self.walk(&mut |at| {
-            let extent = at.extent();
-            if !extent.overlaps(cell) {
-                return false;
-            }
-            if at.is_leaf() || extent.size().x <= fine {
-                let part = at.over_part(&Aabb::new(cell.min.max(extent.min), cell.max.min(extent.max)));
-                range = Some(range.map_or(part, |known| known.hull(part)));
-                return false;
-            }
-            true
-        });
-        let range = range.unwrap_or(Interval::ALL).widen(self.rounding(cell.max));
-        if self.continuity == Continuity::Everywhere { range.intersection(center) } else { range }
     }
 }
