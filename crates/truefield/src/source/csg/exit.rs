@@ -28,10 +28,16 @@ struct Plane {
 /// met so far would be left, and adding that of the place where this was not enough. Where it was, planes are met anew
 /// from next to the end of the way: those from farther away may have asked for too much.
 ///
-/// It starts by looking at the place that `step` leads to. `beyond` answers how far out a step leads, and the slope of that there.
-pub(super) fn shortest(clear: f64, mut step: DVec3, mut beyond: impl FnMut(DVec3) -> Option<(f64, DVec3)>) -> Option<f64> {
-    let mut met = |at: DVec3| {
-        let (out, slope) = beyond(at).filter(|(_, slope)| slope.is_finite() && *slope != DVec3::ZERO)?;
+/// It starts by looking at the place that `step` leads to. `beyond` answers how far out a step leads, `slope` the slope of
+/// that there.
+pub(super) fn shortest(
+    clear: f64,
+    mut step: DVec3,
+    beyond: impl Fn(DVec3) -> Option<f64>,
+    slope: impl Fn(DVec3) -> Option<DVec3>,
+) -> Option<f64> {
+    let met = |at: DVec3| {
+        let (out, slope) = (beyond(at)?, slope(at).filter(|slope| slope.is_finite() && *slope != DVec3::ZERO)?);
         // A little beyond the surface, so that places next to it count as left.
         Some((out, Plane { slope, height: 1.5 * clear - out + slope.dot(at) }))
     };
@@ -46,7 +52,7 @@ pub(super) fn shortest(clear: f64, mut step: DVec3, mut beyond: impl FnMut(DVec3
             let (mut short, mut long) = (0.0, 1.0);
             for _ in 0..HALVES {
                 let middle = 0.5 * (short + long);
-                if met(step * middle).is_some_and(|(out, _)| out >= clear) { long = middle } else { short = middle }
+                if beyond(step * middle).is_some_and(|out| out >= clear) { long = middle } else { short = middle }
             }
             step *= long;
             let (way, before) = (step.length(), best);
@@ -56,7 +62,7 @@ pub(super) fn shortest(clear: f64, mut step: DVec3, mut beyond: impl FnMut(DVec3
             }
             planes.clear();
             let back = held.iter().map(|plane: &Plane| step - plane.slope * (BACK * way / plane.slope.length()));
-            planes.extend(back.filter_map(&mut met).map(|(_, plane)| plane));
+            planes.extend(back.filter_map(met).map(|(_, plane)| plane));
         }
         let Some(found) = nearest(&planes) else { break };
         (step, held) = found;
@@ -118,16 +124,17 @@ mod tests {
             let beyond = |step: DVec3| {
                 let q = p + step;
                 let axis = q.min_position();
-                Some((q[axis], DVec3::AXES[axis]))
+                (q[axis], DVec3::AXES[axis])
             };
-            let way = shortest(1e-9, DVec3::ZERO, beyond).unwrap_or(f64::NAN);
+            let way = shortest(1e-9, DVec3::ZERO, |step| Some(beyond(step).0), |step| Some(beyond(step).1)).unwrap_or(f64::NAN);
             assert!((way - p.min(DVec3::ZERO).length()).abs() < 1e-8, "{way} from {p}");
         }
     }
 
     #[test]
     fn there_is_no_way_between_walls_that_face_each_other() {
-        let walls = |step: DVec3| Some((-1.0 - step.x.abs(), DVec3::X * if step.x > 0.0 { -1.0 } else { 1.0 }));
-        assert_eq!(shortest(1e-9, DVec3::ZERO, walls), None);
+        let walls = |step: DVec3| Some(-1.0 - step.x.abs());
+        let slope = |step: DVec3| Some(DVec3::X * if step.x > 0.0 { -1.0 } else { 1.0 });
+        assert_eq!(shortest(1e-9, DVec3::ZERO, walls, slope), None);
     }
 }

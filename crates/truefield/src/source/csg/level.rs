@@ -156,22 +156,22 @@ impl<'a> Asked<'a> {
 
     /// The way to the other side by tangent planes, straight ahead and, where that is long, looking aside first.
     fn exit(&self) -> Option<f64> {
-        let met = |step: DVec3| {
-            let (q, mut slope) = (self.p + step, [DVec3::ZERO]);
-            let beyond = self.beyond(q)?;
+        let beyond = |step: DVec3| self.beyond(self.p + step);
+        let slope = |step: DVec3| {
             if step == DVec3::ZERO {
-                return Some((beyond, self.across()));
+                return Some(self.across());
             }
-            self.shape.gradients(&[q], &mut slope).ok()?;
-            Some((beyond, if self.value < 0.0 { slope[0] } else { -slope[0] }))
+            let mut slope = [DVec3::ZERO];
+            self.shape.gradients(&[self.p + step], &mut slope).ok()?;
+            Some(if self.value < 0.0 { slope[0] } else { -slope[0] })
         };
         let clear = 2.0 * self.rounding;
-        let mut best = exit::shortest(clear, DVec3::ZERO, met).unwrap_or(f64::INFINITY);
+        let mut best = exit::shortest(clear, DVec3::ZERO, beyond, slope).unwrap_or(f64::INFINITY);
         let way = self.value.abs();
         if best > ASIDE * way {
             let (u, w) = self.gradient.any_orthonormal_pair();
             for aside in [u, -u, w, -w] {
-                best = best.min(exit::shortest(clear, aside * way, met).unwrap_or(f64::INFINITY));
+                best = best.min(exit::shortest(clear, aside * way, beyond, slope).unwrap_or(f64::INFINITY));
             }
         }
         best.is_finite().then_some(best * (1.0 + 4.0 * f64::EPSILON))

@@ -168,6 +168,9 @@ fn boxed(center: DVec3, turn: DMat3, half: DVec3) -> Aabb {
     Aabb::new(center - reach, center + reach)
 }
 
+/// Points that are moved together.
+const GROUP: usize = 64;
+
 /// A shape somewhere else.
 #[derive(Clone)]
 pub struct Placed {
@@ -213,9 +216,14 @@ impl Distance for Placed {
 
 impl Source for Placed {
     fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
-        self.shape.values(&self.inward(points), out)?;
-        for out in out {
-            *out *= self.placement.scale;
+        let mut inward = [DVec3::ZERO; GROUP];
+        for (points, out) in points.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
+            let inward = &mut inward[..points.len()];
+            for (inward, &p) in inward.iter_mut().zip(points) {
+                *inward = self.placement.inward(p);
+            }
+            self.shape.values(inward, out)?;
+            out.iter_mut().for_each(|out| *out *= self.placement.scale);
         }
         Ok(())
     }

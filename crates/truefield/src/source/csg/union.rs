@@ -100,6 +100,20 @@ impl Union {
 
     /// The least value of each point and its part.
     fn each(&self, points: &[DVec3], mut keep: impl FnMut(usize, f64, usize)) -> Result<()> {
+        if let [p] = points
+            && self.parts.len() <= FEW
+        {
+            let (mut least, mut first) = (f64::INFINITY, 0);
+            for (number, part) in self.parts.iter().enumerate() {
+                let mut value = [0.0];
+                part.values(&[*p], &mut value)?;
+                if value[0] < least || value[0].is_nan() {
+                    (least, first) = (value[0], number);
+                }
+            }
+            keep(0, least, first);
+            return Ok(());
+        }
         let mut values = [0.0; GROUP];
         for (group, points) in points.chunks(GROUP).enumerate() {
             let together = if self.parts.len() <= FEW {
@@ -236,10 +250,12 @@ impl Source for Union {
     }
 
     fn gradients(&self, points: &[DVec3], out: &mut [DVec3]) -> Result<()> {
-        let mut parts = vec![0; points.len()];
-        self.each(points, |i, _, part| parts[i] = part)?;
-        for ((out, &p), part) in out.iter_mut().zip(points).zip(parts) {
-            self.parts[part].gradients(&[p], std::slice::from_mut(out))?;
+        let mut parts = [0; GROUP];
+        for (points, out) in points.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
+            self.each(points, |i, _, part| parts[i] = part)?;
+            for ((out, &p), &part) in out.iter_mut().zip(points).zip(&parts) {
+                self.parts[part].gradients(&[p], std::slice::from_mut(out))?;
+            }
         }
         Ok(())
     }
