@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -10,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
-from truefield.csg import mesh as as_shape
 from truefield.csg import sweep
 from truefield.errors import TruefieldError
 from truefield.fields import Part, Surface
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
 from truefield.sampled import SampledField
-from truefield.shape import Shape
+from truefield.shape import Shape, Solid, unite
+from truefield.shape import shape as as_shape
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -67,23 +68,58 @@ class Leaves:
     upper: Floats
 
 
+@dataclass(frozen=True, slots=True)
+class _Made:
+    """What an edited field is of: put together when it is asked for."""
+
+    before: Shape | _Made
+    operation: str
+    tool: Shape
+    radius: float
+
+    def shape(self) -> Shape:
+        edits: list[_Made] = []
+        shape: Shape | _Made = self
+        while isinstance(shape, _Made):
+            edits.append(shape)
+            shape = shape.before
+        # Edits of one kind, one after the other, are one step.
+        for operation, group in groupby(reversed(edits), key=lambda edit: edit.operation):
+            several = list(group)
+            tools = [edit.tool for edit in several]
+            match operation:
+                case "carve":
+                    shape = shape - unite(tools)
+                case "fill":
+                    shape = unite([shape, *tools])
+                case "intersect":
+                    for tool in tools:
+                        shape = shape & tool
+                case _:
+                    for edit in several:
+                        shape = shape.blend(edit.tool, edit.radius, "polynomial")
+        return shape
+
+
 class AdaptiveField:
     """Distances at the corners of the cells of an octree, with a proven error for each cell. Immutable.
 
     Made by `adaptive_field`.
     """
 
-    __slots__ = ("_native", "_shape")
+    __slots__ = ("_made", "_native")
 
-    def __init__(self, native: _truefield.AdaptiveField, shape: Shape | None = None) -> None:
+    def __init__(self, native: _truefield.AdaptiveField, made: Shape | _Made | None = None) -> None:
         """For makers of fields: the compiled field, and what it is of, where that is known."""
         self._native = native
-        self._shape = shape
+        self._made = made
 
     @property
     def shape(self) -> Shape | None:
-        """What the field was made of; None for one that was loaded."""
-        return self._shape
+        """What the field is of, all edits included; None for one that was loaded, or made of samples."""
+        if isinstance(self._made, _Made):
+            self._made = self._made.shape()
+        return self._made
 
     @property
     def extent(self) -> tuple[Floats, Floats]:
@@ -171,7 +207,7 @@ class AdaptiveField:
         self,
         distance: float = 0.0,
         *,
-        shape: Part | Shape | None = None,
+        shape: Solid | None = None,
         memory: int | None = None,
         threads: int | None = None,
         progress: Progress | None = None,
@@ -197,7 +233,7 @@ class AdaptiveField:
             TruefieldError: no corner of a cell is below `distance`.
             MemoryError: the mesh does not fit.
         """
-        of = self._shape if shape is None else _shape(shape)
+        of = self.shape if shape is None else as_shape(shape)
         native = None if of is None else of._native
         vertices, triangles, low, high = _truefield.adaptive_surface(
             self._native,
@@ -211,7 +247,7 @@ class AdaptiveField:
 
     def carve(
         self,
-        tool: Part | Shape,
+        tool: Solid,
         path: ArrayLike | None = None,
         *,
         memory: int | None = None,
@@ -221,7 +257,7 @@ class AdaptiveField:
         """The field without the tool: max(field, -tool), a new field; this one stays as it is.
 
         Args:
-            tool: a part or a Shape.
+            tool: a Shape, a mesh, a Surface or another AdaptiveField, whose errors then count too.
             path: what the tool is swept along, as `csg.sweep` takes it: (n, 3) points or (n, 4, 4) poses; the tool must
                 then be a ball or convex.
             memory: refuse to take more bytes for new cells; half the machine's memory by default.
@@ -243,7 +279,7 @@ class AdaptiveField:
 
     def fill(
         self,
-        tool: Part | Shape,
+        tool: Solid,
         path: ArrayLike | None = None,
         *,
         memory: int | None = None,
@@ -255,7 +291,7 @@ class AdaptiveField:
 
     def intersect(
         self,
-        tool: Part | Shape,
+        tool: Solid,
         *,
         memory: int | None = None,
         threads: int | None = None,
@@ -266,7 +302,7 @@ class AdaptiveField:
 
     def blend(
         self,
-        tool: Part | Shape,
+        tool: Solid,
         radius: float,
         *,
         memory: int | None = None,
@@ -324,7 +360,7 @@ class AdaptiveField:
     def _edited(
         self,
         operation: str,
-        tool: Part | Shape,
+        tool: Solid,
         radius: float,
         *,
         path: ArrayLike | None = None,
@@ -332,11 +368,12 @@ class AdaptiveField:
         threads: int | None,
         progress: Progress | None,
     ) -> AdaptiveField:
-        cutter = _shape(tool) if path is None else sweep(_shape(tool), path)
+        cutter = as_shape(tool) if path is None else sweep(tool, path)
         native = _truefield.edit_field(
             self._native, cutter._native, operation, radius, arguments.memory(memory), threads, progress
         )
-        return AdaptiveField(native)
+        made = None if self._made is None else _Made(self._made, operation, cutter, radius)
+        return AdaptiveField(native, made)
 
     def render(self, path: PathLike | None = None, **how: Any) -> Image.Image:
         """A picture of the field by rays; see `truefield.pictures.field_picture` for what it takes."""
@@ -351,7 +388,7 @@ class AdaptiveField:
 
 
 def adaptive_field(
-    part: Part | Shape | SampledField,
+    part: Solid | SampledField,
     tolerance: float | None = None,
     *,
     growth: float = 0.05,
@@ -366,7 +403,7 @@ def adaptive_field(
     """The adaptively sampled field of a part or shape (Frisken, Perry, Rockwood and Jones 2000).
 
     Args:
-        part: a mesh, a Surface or a Shape; or a SampledField, whose cells are merged where one says the same as eight
+        part: a mesh, a Surface, a Shape, or an AdaptiveField to sample anew; or a SampledField, whose cells are merged where one says the same as eight
             within the tolerance (bottom up; its errors are those of the samples, `max_depth` may not be less than they
             need, and `domain`, `method` and `rule` do not matter).
         tolerance: the largest error at the surface, model units. Exact leaves have none: they do without, and edits of
@@ -413,7 +450,7 @@ def adaptive_field(
             progress,
         )
         return AdaptiveField(merged)
-    shape = _shape(surface)
+    shape = as_shape(surface)
     if isinstance(surface, Surface) and method != "cubic":
         native = _truefield.AdaptiveField.of_surface(
             surface._native, error, slope, deepest, box, method, rule, room, threads, progress
@@ -423,16 +460,6 @@ def adaptive_field(
             shape._native, error, slope, deepest, box, method, rule, room, threads, progress
         )
     return AdaptiveField(native, shape)
-
-
-def _shape(part: Part | Shape) -> Shape:
-    if isinstance(part, Shape):
-        return part
-    if not isinstance(part, TriangleMesh | Surface):
-        raise TruefieldError(
-            f"a part is a TriangleMesh, a Surface or a Shape, not {type(part).__name__}; make one of those"
-        )
-    return as_shape(part)
 
 
 def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:

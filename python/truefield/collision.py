@@ -10,9 +10,9 @@ import numpy as np
 from truefield import _truefield, arguments
 from truefield.adaptive import AdaptiveField
 from truefield.arguments import Floats, Progress
-from truefield.csg import mesh as as_shape
 from truefield.fields import Part
 from truefield.shape import Shape
+from truefield.shape import shape as as_shape
 
 State = Literal["separated", "penetrating", "touching or undecided"]
 

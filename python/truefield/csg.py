@@ -8,7 +8,7 @@ least of its parts', exact outside; `Shape.bounds` says where it is only a bound
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +17,11 @@ from truefield import _truefield, arguments
 from truefield.errors import TruefieldError
 from truefield.fields import Surface
 from truefield.mesh import TriangleMesh
-from truefield.shape import Axis, Shape, Solid, Vector, axis_text, direction, inner, numbers, of_mesh, unite, vector
+from truefield.shape import Axis, Shape, Solid, Vector, axis_text, direction, inner, numbers, of_field, of_mesh, unite, vector
 from truefield.shape import shape as as_shape
+
+if TYPE_CHECKING:
+    from truefield.adaptive import AdaptiveField
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
@@ -117,6 +120,22 @@ def mesh(part: TriangleMesh | Surface) -> Shape:
     if not isinstance(part, TriangleMesh | Surface):
         raise TruefieldError(f"csg.mesh takes a TriangleMesh or a Surface, not {type(part).__name__}; read it first")
     return of_mesh(part)
+
+
+def field(of: AdaptiveField) -> Shape:
+    """The solid of an adaptive field as a shape: as a tool, as a part of other shapes, or to sample it anew.
+
+    Its value is what the field says, and `Shape.bounds` has the field's errors, so that what is made of it is as far from
+    the truth as the field is. Outside the domain it is positive and less than the distance: give a field that is to be
+    a tool a domain with room around the solid.
+
+    Raises:
+        TruefieldError: the field does not know all of its solid, which reaches beyond the domain; or it is of a mesh
+            with openings; or it holds no solid.
+    """
+    if not isinstance(getattr(of, "_native", None), _truefield.AdaptiveField):
+        raise TruefieldError(f"csg.field takes an AdaptiveField, not {type(of).__name__}; make one with adaptive_field")
+    return of_field(of._native)
 
 
 def union(*shapes: Solid | Sequence[Solid]) -> Shape:

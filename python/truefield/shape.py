@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, Union
+from typing import TYPE_CHECKING, Literal, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +14,13 @@ from truefield.errors import TruefieldError
 from truefield.fields import Surface
 from truefield.mesh import TriangleMesh
 
+if TYPE_CHECKING:
+    from truefield.adaptive import AdaptiveField
+
 Vector = Sequence[float] | Floats
 Axis = Literal["x", "y", "z"] | Sequence[float] | Floats
 Blend = Literal["circular", "polynomial"]
-Solid = Union["Shape", Surface, TriangleMesh]
+Solid = Union["Shape", Surface, TriangleMesh, "AdaptiveField"]
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _MOST_WRITTEN = 6
@@ -27,7 +30,8 @@ class Shape:
     """A solid that answers distances; immutable. `truefield.csg` and `truefield.implicit` make them.
 
     `a | b` and `a + b` are the union, `a & b` the intersection, `a - b` the difference, `~a` and `-a` all that is
-    not in a. A TriangleMesh or a Surface may stand for either, as `csg.mesh` makes a shape of it.
+    not in a. A TriangleMesh or a Surface may stand for either, as `csg.mesh` makes a shape of it, and an AdaptiveField as
+    `csg.field` does.
     """
 
     __slots__ = ("_ball", "_cuts", "_native", "_parts", "_sum", "_text")
@@ -192,11 +196,11 @@ def unite(shapes: Sequence[Shape]) -> Shape:
 
 
 def shape(given: object) -> Shape:
-    """A Shape as it is; a mesh or Surface made one."""
+    """A Shape as it is; a mesh, a Surface or an AdaptiveField made one."""
     made = _other(given)
     if made is None:
         raise TruefieldError(
-            f"a shape is needed, not {type(given).__name__}; csg and implicit make shapes, csg.mesh of a mesh"
+            f"a shape is needed, not {type(given).__name__}; csg and implicit make shapes, csg.mesh of a mesh, csg.field of a field"
         )
     return made
 
@@ -205,6 +209,11 @@ def of_mesh(part: TriangleMesh | Surface) -> Shape:
     """A mesh as a shape."""
     surface = Surface(part) if isinstance(part, TriangleMesh) else part
     return Shape(_truefield.Shape.mesh(surface._native), f"csg.mesh({surface.mesh.name!r})")
+
+
+def of_field(native: _truefield.AdaptiveField) -> Shape:
+    """The solid of a compiled adaptive field as a shape."""
+    return Shape(_truefield.Shape.field(native), "csg.field(<adaptive field>)")
 
 
 def vector(name: str, value: Vector) -> list[float]:
@@ -245,6 +254,10 @@ def inner(of: Shape) -> str:
 def _other(given: object) -> Shape | None:
     if isinstance(given, TriangleMesh | Surface):
         return of_mesh(given)
+    # Fields are made of shapes: their module cannot be known here.
+    native = getattr(given, "_native", None)
+    if isinstance(native, _truefield.AdaptiveField):
+        return of_field(native)
     return given if isinstance(given, Shape) else None
 
 

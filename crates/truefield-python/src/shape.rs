@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
+use truefield::field::adaptive::Solid;
 use truefield::source::csg::{self, BlendKind, Placement};
 use truefield::{DVec3, Error, Source, source};
 
+use crate::adaptive::PyAdaptiveField;
 use crate::convert::{column, points, rows};
 use crate::door::{job, raise};
 use crate::surface::{PySurface, interval_arrays};
@@ -34,6 +36,13 @@ impl PyShape {
     #[staticmethod]
     fn mesh(surface: &PySurface) -> Self {
         Self(Arc::clone(&surface.0) as Arc<dyn Source>)
+    }
+
+    /// The solid of an adaptive field.
+    #[staticmethod]
+    fn field(py: Python<'_>, field: &PyAdaptiveField) -> PyResult<Self> {
+        let field = Arc::clone(&field.field);
+        py.detach(|| Solid::new(field)).map(Self::of).map_err(raise)
     }
 
     /// What is not in the shape.

@@ -98,7 +98,7 @@ pub trait Source: Distance {
     /// The default knows what [`Source::bend`] says of the cell, and that values change by no more than one moves. Shapes
     /// whose slope jumps along seams of known sides can say more. Fails as [`Source::values`] does.
     fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
-        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        block.residual(block.between(self.bend(&block.cell), self.noise_over(&block.cell)), out);
         Ok(())
     }
 
@@ -115,6 +115,12 @@ pub trait Source: Distance {
     /// No less than how far solving or rounding can move a value from one that changes by no more than one moves.
     fn noise(&self) -> f64 {
         0.0
+    }
+
+    /// [`Source::noise`] in a cell.
+    fn noise_over(&self, cell: &Aabb) -> f64 {
+        let _ = cell;
+        self.noise()
     }
 }
 
@@ -150,6 +156,17 @@ impl<'a> SampleBlock<'a> {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Whether the lattice's axes are those of the cell.
+    pub fn is_upright(&self) -> bool {
+        let (Some(&first), Some(&last)) = (self.points.first(), self.points.last()) else { return false };
+        let size = self.cell.min.abs().max(self.cell.max.abs()).max_element();
+        let near = |a: DVec3, b: DVec3| {
+            let apart = (a - b).abs();
+            apart.x.max(apart.y) <= 64.0 * f64::EPSILON * size && (self.boxes[2] == 0 || apart.z <= 64.0 * f64::EPSILON * size)
+        };
+        near(first, self.cell.min) && near(last, self.cell.max)
     }
 
     /// Takes the number of each box and the nodes at its corners, x slowest; along a z without boxes the same ones twice.

@@ -264,7 +264,9 @@ impl Builder<'_> {
     fn judge(&self, draft: &Draft<'_>, part: &mut Part) -> Result<()> {
         let extent = self.root.cell(self.depth, draft.index);
         let block = self.layout.block(&extent, draft.points, draft.samples);
-        let allowed = self.rules.allowed(Layout::least(&block, self.source.noise()));
+        let noise = self.source.noise_over(&extent);
+        // What the shape itself leaves open, no division makes less.
+        let allowed = self.rules.allowed(Layout::least(&block, noise)) + 2.0 * noise;
         let corners = self.layout.corners(draft.samples).map(|v| v as f32);
         let last = self.depth == self.rules.max_depth;
         let linear = self.layout.linear(&corners);

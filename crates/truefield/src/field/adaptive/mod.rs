@@ -17,6 +17,7 @@ mod levels;
 mod many;
 mod model;
 mod page;
+mod solid;
 
 use std::sync::Arc;
 
@@ -32,6 +33,7 @@ pub use edits::{Change, Edit, Edits};
 pub use levels::{Level, LevelKind, Levels};
 pub(crate) use page::{Kind, Page};
 pub use page::{ListSide, Lists, Record, Samples};
+pub use solid::Solid;
 
 use super::each::each;
 use crate::distance::Distance;

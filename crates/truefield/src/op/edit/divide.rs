@@ -182,7 +182,7 @@ impl<'a> Divider<'a> {
         let axes = self.field.division().axes();
         let half = (0..axes).map(|axis| extent.size()[axis].powi(2)).sum::<f64>().sqrt() * 0.5;
         let said_x = turned.field_range(old.values_over(extent));
-        let said_y = Interval::around(turned.tool(center), half * (1.0 + 1e-12) + 2.0 * self.tool.noise());
+        let said_y = Interval::around(turned.tool(center), half * (1.0 + 1e-12) + 2.0 * self.tool.noise_over(extent));
         let slack = turned.tool_range(self.tool.slack(extent));
         let true_x = turned.field_range(old.over_part(extent));
         let wide = said_y.plus(slack);
@@ -276,9 +276,11 @@ impl<'a> Divider<'a> {
         let worst = said.worst(&block);
         // Steeper than a distance: as if it were one with so much noise.
         let steep = if alone == Alone::Tool { 1.0 } else { piece.old.steepest() };
-        let noise = self.tool.noise() + 0.25 * (steep - 1.0).max(0.0) * block.square.sqrt() * (1.0 + 1e-12);
+        let of_tool = self.tool.noise_over(extent);
+        let noise = of_tool + 0.25 * (steep - 1.0).max(0.0) * block.square.sqrt() * (1.0 + 1e-12);
         let accuracy = self.field.accuracy();
-        let allowed = accuracy.allowed(Layout::least(&block, noise));
+        // What the tool itself leaves open, no division makes less.
+        let allowed = accuracy.allowed(Layout::least(&block, noise)) + 2.0 * of_tool;
         let last = piece.depth >= accuracy.max_depth.min(MAX_DEPTH);
         if worst > allowed && !last {
             return Ok(Outcome::Divide);

@@ -117,4 +117,8 @@ impl Source for Complement {
     fn noise(&self) -> f64 {
         self.shape.noise()
     }
+
+    fn noise_over(&self, cell: &Aabb) -> f64 {
+        self.shape.noise_over(cell)
+    }
 }

@@ -267,4 +267,9 @@ impl Source for Placed {
         let reach = self.extent().map_or(self.placement.shift.abs().max_element(), |e| e.min.abs().max(e.max.abs()).max_element());
         self.shape.noise() * self.placement.scale + 8.0 * f64::EPSILON * reach
     }
+
+    fn noise_over(&self, cell: &Aabb) -> f64 {
+        let within = self.shape.noise_over(&self.placement.inward_box(cell)) * self.placement.scale;
+        self.noise().min(within + 8.0 * f64::EPSILON * cell.min.abs().max(cell.max.abs()).max_element())
+    }
 }
