@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +59,6 @@ def test_a_tool_is_swept_along_its_path(field: tf.AdaptiveField) -> None:
         field.carve(csg.sphere(0.1), path=[[np.nan, 0.0, 0.0]])
     with pytest.raises(tf.TruefieldError, match="radius"):
         field.blend(csg.sphere(0.1), -1.0)
-    with pytest.raises(tf.TruefieldError, match="not AdaptiveField"):
-        field.carve(field)  # type: ignore[arg-type]
 
 
 def test_detail_grows_coarser_and_stays_honest(field: tf.AdaptiveField, points: tf.arguments.Floats) -> None:
@@ -179,3 +178,55 @@ def test_polygons_are_flat_shapes() -> None:
             polygons.polygon(loops)  # type: ignore[arg-type]
     with pytest.raises(tf.TruefieldError, match="fill"):
         polygons.polygon([[0, 0], [1, 0], [1, 1]], fill="odd")  # type: ignore[arg-type]
+
+
+def test_fields_are_tools_and_shapes(field: tf.AdaptiveField, points: tf.arguments.Floats) -> None:
+    """A field cuts as the shape it is of, and mixes with shapes."""
+    ball_at = csg.sphere(0.4, center=(1, 0, 0))
+    tool = tf.adaptive_field(ball_at, 0.01, domain=((-0.6, -1.2, -1.2), (2.2, 1.2, 1.2)))
+    carved, expected = field.carve(tool), field.carve(ball_at)
+    said, wanted = carved.distance(points), expected.distance(points)
+    near_surface = np.abs(wanted) < 0.1
+    assert np.abs(said - wanted)[near_surface].max() < 0.04
+    assert np.abs(said - wanted).max() < 0.2
+    low, high = carved.bounds(points)
+    truth_low, truth_high = expected.bounds(points)
+    assert (low <= truth_high + 1e-9).all()
+    assert (truth_low <= high + 1e-9).all()
+    near = np.array([[0.6, 0, 0], [1, 0.4, 0], [0.85, 0.1, 0.2]])
+    for mixed in (csg.field(tool) - csg.sphere(0.1), tool.fill(csg.sphere(0.1)), csg.box((3, 3, 3)) & csg.field(tool)):
+        assert np.allclose(mixed.distance(near), ball_at.distance(near), atol=0.03)
+    again = tf.adaptive_field(tool, 0.02)
+    assert (np.abs(again.distance(near) - ball_at.distance(near)) < 0.04).all()
+
+
+def test_edited_fields_know_what_they_are_of(field: tf.AdaptiveField) -> None:
+    """Sharp edges are kept after edits, one kind after another."""
+    step = csg.box((0.5, 0.5, 0.5), center=(0.8, 0, 0))
+    edited = field.carve(step).carve(csg.sphere(0.2, center=(-1, 0, 0))).fill(csg.box((0.4, 0.4, 0.4), center=(0, 1, 0)))
+    whole = (ball() - step - csg.sphere(0.2, center=(-1, 0, 0))) | csg.box((0.4, 0.4, 0.4), center=(0, 1, 0))
+    shape = edited.intersect(csg.box((4, 4, 1.8))).blend(csg.sphere(0.2, center=(0, -1, 0)), 0.1).shape
+    assert shape is not None
+    assert edited.shape is not None
+    points = np.random.default_rng(4).uniform(-1.3, 1.3, (2000, 3))
+    assert np.allclose(edited.shape.distance(points), whole.distance(points), atol=1e-12)
+    blended = (whole & csg.box((4, 4, 1.8))).blend(csg.sphere(0.2, center=(0, -1, 0)), 0.1, "polynomial")
+    assert np.allclose(shape.distance(points), blended.distance(points), atol=1e-12)
+    # Along the inner edge of the step, where an interpolated surface would be round.
+    edge = np.abs(np.abs(edited.surface().vertices[:, :2]) - (0.55, 0.25)).max(axis=1)
+    assert np.count_nonzero(edge < 1e-6) > 10
+    assert tf.adaptive_field(ball(), 0.05).level_of_detail(depth=2).shape is None
+
+
+@pytest.mark.parametrize(
+    ("sentence", "make"),
+    [
+        ("beyond", lambda: csg.field(tf.adaptive_field(ball(), 0.1, domain=((0, 0, 0), (2, 2, 2))))),
+        ("csg.field takes an AdaptiveField", lambda: csg.field(ball())),  # type: ignore[arg-type]
+        ("a shape is needed", lambda: tf.adaptive_field(ball(), 0.1).carve("ball")),  # type: ignore[arg-type]
+    ],
+)
+def test_what_is_no_tool_is_refused(sentence: str, make: Callable[[], object]) -> None:
+    """One sentence says why."""
+    with pytest.raises(tf.TruefieldError, match=sentence):
+        make()

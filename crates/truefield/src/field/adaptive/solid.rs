@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{AdaptiveField, Cell, Division, Leaf};
+use super::{AdaptiveField, Cell, Coverage, Division, Leaf};
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
@@ -27,6 +27,11 @@ impl Solid {
     pub fn new(field: Arc<AdaptiveField>) -> Result<Self> {
         if field.continuity() == Continuity::ExceptOpenings {
             return Err(Error::invalid("the field is of a mesh with openings, which has no definite inside; close the mesh first"));
+        }
+        if field.coverage() != Coverage::Whole {
+            return Err(Error::invalid(
+                "the field may not hold all of its solid, which reaches beyond the domain or is not known not to; give it a larger domain",
+            ));
         }
         let (mut extent, mut noise) = (Aabb::EMPTY, 0.0f64);
         field.walk(&mut |cell| {
