@@ -1,9 +1,12 @@
 //! Shapes from formulas: the true distance, against shapes whose distance is known and against brute force.
 
+mod residual;
+
 use std::f64::consts::PI;
 
+use residual::residuals;
 use truefield::laws::{Random, check_distance, check_lipschitz, check_threads};
-use truefield::source::implicit::{Expression, Implicit, Unary};
+use truefield::source::implicit::{Binary, Expression, Implicit, Unary};
 use truefield::{Aabb, DVec3, Distance, Interval, Run, Source};
 
 fn axes() -> [Expression; 3] {
@@ -207,7 +210,7 @@ fn kinks_and_poles_and_cusps_stay_honest() {
     let mut random = Random::new(5);
     // A box by maxima: edges and corners.
     let half = |e: &Expression, h: f64| e.unary(Unary::Absolute) - h;
-    let max = |a: Expression, b: Expression| a.binary(truefield::source::implicit::Binary::Maximum, &b);
+    let max = |a: Expression, b: Expression| a.binary(Binary::Maximum, &b);
     let block = shape(&max(max(half(&x, 0.5), half(&y, 0.3)), half(&z, 0.2)), cube(1.0));
     let judge = |p: DVec3| {
         let q = p.abs() - DVec3::new(0.5, 0.3, 0.2);
@@ -285,6 +288,24 @@ fn bends_hold_second_differences_and_slack_holds_the_rest() {
 }
 
 /// Places as a tree asks for them: lattices of cells, of which many lie on planes of symmetry.
+#[test]
+fn what_is_said_between_samples_holds() {
+    let mut random = Random::new(16);
+    let wall = {
+        let [x, y, _] = axes();
+        x.binary(Binary::Maximum, &y)
+    };
+    for (expression, size) in [(ball(), 1.5), (torus(1.0, 0.4), 1.7), (gyroid(), PI), (wall, 1.0)] {
+        let shape = shape(&expression, cube(size));
+        for n in 0..60 {
+            let p = random.within(&cube(size * if n % 4 == 0 { 1.3 } else { 0.9 }));
+            // Cells off the surface, where the sides are one, and cells across it.
+            let scale = size * [0.02, 0.1, 1.0][n % 3];
+            residuals("a formula", &shape, p, scale, 2.0 * shape.noise(), &mut random);
+        }
+    }
+}
+
 fn lattices(random: &mut Random, domain: &Aabb, count: usize) -> Vec<DVec3> {
     let mut places = Vec::new();
     for index in 0..count {

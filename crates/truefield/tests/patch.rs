@@ -1,5 +1,8 @@
 //! Bezier patches: the closest point against known shapes and dense samples, and the side against the triangles' own.
 
+mod residual;
+
+use residual::residuals;
 use truefield::laws::{Random, check_lipschitz, check_threads};
 use truefield::source::patch::{Bezier, Patches, Sides};
 use truefield::{Aabb, DVec3, Distance, Run, Source};
@@ -171,6 +174,18 @@ fn slack_and_bend_hold() {
         assert!(bend.widen(4.0 * shape.noise() / (step * step)).contains(second), "{second} at {middle}, {bend:?}");
     }
     assert!(simple > 100, "only {simple} of 300 cells are simple");
+}
+
+#[test]
+fn what_is_said_between_samples_holds() {
+    let mut random = Random::new(8);
+    for set in [ball(), cube(0.7)] {
+        let shape = patches(&set, Sides::Closed);
+        for n in 0..200 {
+            let p = random.direction() * random.length(0.2, 2.0);
+            residuals("patches", &shape, p, [0.05, 0.4][n % 2], 2.0 * shape.noise(), &mut random);
+        }
+    }
 }
 
 #[test]

@@ -1,5 +1,8 @@
 //! Polygons: distances by brute force, bends by second differences, trees of columns.
 
+mod residual;
+
+use residual::residuals;
 use truefield::build::adaptive::{Rules, adaptive, root};
 use truefield::field::adaptive::Division;
 use truefield::laws::Random;
@@ -79,6 +82,18 @@ fn bends_hold_second_differences() {
             let second = (value(p - way) - 2.0 * value(p) + value(p + way)) / (step * step);
             assert!(bend.widen(1e-12 / (step * step)).contains(second), "{second} not in {bend:?} over {cell:?} of {loops:?} {fill:?}");
             assert!(polygon.over(&cell).contains(value(p)));
+        }
+    }
+}
+
+#[test]
+fn what_is_said_between_samples_holds() {
+    let mut random = Random::new(12);
+    for (loops, fill) in shapes() {
+        let polygon = Polygon::new(&loops, fill).expect("a polygon");
+        for n in 0..1000 {
+            let p = random.within(&Aabb::new(DVec3::splat(-1.6), DVec3::splat(1.6)));
+            residuals("a polygon", &polygon, p, [0.1, 1.0][n % 2], 1e-13, &mut random);
         }
     }
 }

@@ -92,7 +92,8 @@ fn fields_are_tools() {
                 let p = random.within(&domain);
                 let (found, exact) = (after.at(p).widen(1e-12), truth.distance(p));
                 assert!(found.contains(exact), "{rules:?}, {operation:?}: {exact} at {p} is not in {found:?}");
-                let allowed = 4.0 * rules.tolerance + 3.0 * if rules.growth.is_finite() { rules.growth * exact.abs() } else { f64::INFINITY };
+                let allowed =
+                    4.0 * rules.tolerance + 3.0 * if rules.growth.is_finite() { rules.growth * exact.abs() } else { f64::INFINITY };
                 let said = after.interpolate(p).expect("inside");
                 // Beyond the domain of its field a tool's value is less than its distance.
                 let known = tool.field().extent_box().contains(p);
@@ -111,7 +112,8 @@ fn fields_are_sampled_anew() {
     let mut random = Random::new(5);
     for shape in shapes() {
         let once = solid(&*shape, &Rules { max_depth: 6, ..Rules::within(0.02) });
-        let moved = Placed::new(Arc::new(once.clone()), Placement::translate(DVec3::new(0.013, 0.02, -0.04)).expect("a way")).expect("placed");
+        let moved =
+            Placed::new(Arc::new(once.clone()), Placement::translate(DVec3::new(0.013, 0.02, -0.04)).expect("a way")).expect("placed");
         let again = build(&moved, &Rules { max_depth: 6, ..Rules::within(0.03) });
         let domain = again.extent_box();
         for _ in 0..5000 {
@@ -129,7 +131,10 @@ fn fields_without_a_whole_solid_are_refused() {
     let rules = Rules::within(0.05);
     let part = |source: &dyn Source, domain: Aabb| {
         let root = root(source, Some(domain), Division::Octree).expect("a box");
-        Solid::new(Arc::new(adaptive(source, root, &rules, &Run::default()).expect("a field"))).map(|_| ()).expect_err("refused").to_string()
+        Solid::new(Arc::new(adaptive(source, root, &rules, &Run::default()).expect("a field")))
+            .map(|_| ())
+            .expect_err("refused")
+            .to_string()
     };
     assert!(part(&*ball, half).contains("beyond"), "{}", part(&*ball, half));
     let away = Aabb::new(DVec3::splat(2.0), DVec3::splat(3.0));

@@ -2,9 +2,10 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
+use crate::source::balls;
 
 /// Something that computes numbers at points: negative inside the shape.
 pub trait Callback: Send + Sync {
@@ -183,6 +184,16 @@ impl<C: Callback> Source for Function<C> {
         let (at, value) = found[0];
         let moved = 2.0 * cell.radius() * (1.0 + 1e-12);
         Interval { lower: at.lower - value - moved, upper: at.upper - value + moved }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        let ask = |points: &[DVec3], out: &mut [Interval]| {
+            let found = self.answers(points)?;
+            out.iter_mut().zip(found).for_each(|(out, (_, value))| *out = Interval::exact(value));
+            Ok(())
+        };
+        balls::narrow(block, self.noise(), ask, out)
     }
 
     fn bend(&self, cell: &Aabb) -> Interval {

@@ -1,6 +1,7 @@
 //! Shapes that can be asked their distance.
 
 mod ask;
+pub(crate) mod balls;
 pub mod csg;
 pub mod function;
 pub mod implicit;

@@ -1,8 +1,9 @@
 //! Closed polygons in the plane, the same at every height: exact distances to their edges.
 
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
+use crate::source::balls;
 
 /// Edges whose box is looked at together.
 const GROUP: usize = 8;
@@ -167,6 +168,15 @@ impl Source for Polygon {
             *out = self.value(*p);
         }
         Ok(())
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        let ask = |points: &[DVec3], out: &mut [Interval]| {
+            self.at_many(points, out);
+            Ok(())
+        };
+        balls::narrow(block, self.noise(), ask, out)
     }
 
     /// The distance to one edge is convex; so is its negative concave, inside. A cell with several edges has ridges.

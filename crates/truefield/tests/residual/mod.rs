@@ -12,8 +12,8 @@ fn value(shape: &dyn Source, p: DVec3) -> f64 {
 /// Between samples, values stay as near to anything that may be said as the shape promises.
 pub fn residuals(name: &str, shape: &dyn Source, p: DVec3, size: f64, round: f64, random: &mut Random) {
     let edge = random.length(1e-3, 0.5) * size;
-    let low = p -DVec3::new(random.unit(), random.unit(), random.unit()) * edge;
-    let cell = Aabb::new(low, low +DVec3::new(0.1 + random.unit(), 0.1 + random.unit(), 0.1 + random.unit()) * edge);
+    let low = p - DVec3::new(random.unit(), random.unit(), random.unit()) * edge;
+    let cell = Aabb::new(low, low + DVec3::new(0.1 + random.unit(), 0.1 + random.unit(), 0.1 + random.unit()) * edge);
     let boxes = [1 + random.below(3), 1 + random.below(3), 1 + random.below(3)];
     let count = DVec3::from_array(boxes.map(|n| n as f64));
     let each = cell.size() / count;
@@ -34,7 +34,7 @@ pub fn residuals(name: &str, shape: &dyn Source, p: DVec3, size: f64, round: f64
         for _ in 0..8 {
             let share = match random.below(3) {
                 0 => DVec3::splat(0.5),
-                _ =>DVec3::new(random.unit(), random.unit(), random.unit()),
+                _ => DVec3::new(random.unit(), random.unit(), random.unit()),
             };
             let weight = |corner: usize| {
                 let part = |axis: usize| if corner >> axis & 1 == 1 { share[axis] } else { 1.0 - share[axis] };

@@ -5,10 +5,11 @@ use super::expression::Expression;
 use super::search::{Accuracy, Found, Search, both_sides};
 use super::sheet::Side;
 use super::tape::Tape;
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
+use crate::source::balls;
 
 /// Points that are asked together, the fewest for which leaves are looked for, and the most leaves for which that pays.
 const GROUP: usize = 64;
@@ -241,6 +242,10 @@ impl Source for Implicit {
 
     fn bend(&self, cell: &Aabb) -> Interval {
         super::bend::bend(self, cell)
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        balls::of_distance(self, block, out)
     }
 
     fn noise(&self) -> f64 {

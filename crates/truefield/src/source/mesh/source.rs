@@ -2,10 +2,11 @@
 
 use super::Surface;
 use crate::bvh::Candidate;
-use crate::distance::Source;
+use crate::distance::{SampleBlock, Source};
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
+use crate::source::balls;
 
 /// Rounding of a distance, of the largest coordinate.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
@@ -41,6 +42,15 @@ impl Source for Surface {
         }
         let most = (1.0 + 1e-9) / least;
         if inside { Interval { lower: -most, upper: f64::INFINITY } } else { Interval { lower: f64::NEG_INFINITY, upper: most } }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        if self.side_changes_at_surface_only() {
+            return balls::of_distance(self, block, out);
+        }
+        // Through an opening the side may jump on the way to a far sample.
+        block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        Ok(())
     }
 
     fn sided(&self) -> bool {

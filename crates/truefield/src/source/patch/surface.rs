@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use super::bezier::Bezier;
 use super::piece::Piece;
-use crate::distance::{Distance, Source};
+use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::mesh::TriangleMesh;
 use crate::run::Run;
+use crate::source::balls;
 use crate::source::mesh::{SignChoice, SignKind, Surface};
 use crate::source::waiting::Waiting;
 
@@ -366,6 +367,10 @@ impl Source for Patches {
         } else {
             Interval::ALL
         }
+    }
+
+    fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+        balls::of_distance(self, block, out)
     }
 
     fn noise(&self) -> f64 {
