@@ -13,7 +13,7 @@ from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
 from truefield.csg import sweep
 from truefield.errors import TruefieldError
-from truefield.fields import Part, Surface
+from truefield.fields import Surface
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
 from truefield.sampled import SampledField
@@ -403,9 +403,9 @@ def adaptive_field(
     """The adaptively sampled field of a part or shape (Frisken, Perry, Rockwood and Jones 2000).
 
     Args:
-        part: a mesh, a Surface, a Shape, or an AdaptiveField to sample anew; or a SampledField, whose cells are merged where one says the same as eight
-            within the tolerance (bottom up; its errors are those of the samples, `max_depth` may not be less than they
-            need, and `domain`, `method` and `rule` do not matter).
+        part: a mesh, a Surface, a Shape, or an AdaptiveField to sample anew; or a SampledField, whose cells are merged
+            where one says the same as eight within the tolerance (bottom up; its errors are those of the samples,
+            `max_depth` may not be less than they need, and `domain`, `method` and `rule` do not matter).
         tolerance: the largest error at the surface, model units. Exact leaves have none: they do without, and edits of
             them then keep to a thousandth of the part's longest side.
         growth: how much the error may grow per unit of distance from the surface; infinite divides only cells that

@@ -17,7 +17,20 @@ from truefield import _truefield, arguments
 from truefield.errors import TruefieldError
 from truefield.fields import Surface
 from truefield.mesh import TriangleMesh
-from truefield.shape import Axis, Shape, Solid, Vector, axis_text, direction, inner, numbers, of_field, of_mesh, unite, vector
+from truefield.shape import (
+    Axis,
+    Shape,
+    Solid,
+    Vector,
+    axis_text,
+    direction,
+    inner,
+    numbers,
+    of_field,
+    of_mesh,
+    unite,
+    vector,
+)
 from truefield.shape import shape as as_shape
 
 if TYPE_CHECKING:
@@ -125,9 +138,9 @@ def mesh(part: TriangleMesh | Surface) -> Shape:
 def field(of: AdaptiveField) -> Shape:
     """The solid of an adaptive field as a shape: as a tool, as a part of other shapes, or to sample it anew.
 
-    Its value is what the field says, and `Shape.bounds` has the field's errors, so that what is made of it is as far from
-    the truth as the field is. Outside the domain it is positive and less than the distance: give a field that is to be
-    a tool a domain with room around the solid.
+    Its value is what the field says, and `Shape.bounds` has the field's errors, so that what is made of it is as far
+    from the truth as the field is. Outside the domain it is positive and less than the distance: give a field that is
+    to be a tool a domain with room around the solid.
 
     Raises:
         TruefieldError: the field does not know all of its solid, which reaches beyond the domain; or it is of a mesh

@@ -30,8 +30,8 @@ class Shape:
     """A solid that answers distances; immutable. `truefield.csg` and `truefield.implicit` make them.
 
     `a | b` and `a + b` are the union, `a & b` the intersection, `a - b` the difference, `~a` and `-a` all that is
-    not in a. A TriangleMesh or a Surface may stand for either, as `csg.mesh` makes a shape of it, and an AdaptiveField as
-    `csg.field` does.
+    not in a. A TriangleMesh or a Surface may stand for either, as `csg.mesh` makes a shape of it, and an
+    AdaptiveField, as `csg.field` does.
     """
 
     __slots__ = ("_ball", "_cuts", "_native", "_parts", "_sum", "_text")
@@ -200,7 +200,8 @@ def shape(given: object) -> Shape:
     made = _other(given)
     if made is None:
         raise TruefieldError(
-            f"a shape is needed, not {type(given).__name__}; csg and implicit make shapes, csg.mesh of a mesh, csg.field of a field"
+            f"a shape is needed, not {type(given).__name__}; csg and implicit make shapes, csg.mesh makes one of a mesh, "
+            "csg.field of a field"
         )
     return made
 
