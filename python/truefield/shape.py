@@ -200,8 +200,8 @@ def shape(given: object) -> Shape:
     made = _other(given)
     if made is None:
         raise TruefieldError(
-            f"a shape is needed, not {type(given).__name__}; csg and implicit make shapes, csg.mesh makes one of a mesh, "
-            "csg.field of a field"
+            f"a shape is needed, not {type(given).__name__}; csg and implicit make shapes, csg.mesh makes one of a "
+            "mesh, csg.field of a field"
         )
     return made
 
