@@ -144,7 +144,7 @@ def field(of: AdaptiveField) -> Shape:
 
     Raises:
         TruefieldError: the field does not know all of its solid, which reaches beyond the domain; or it is of a mesh
-            with openings; or it holds no solid.
+            with openings, or of a polygon; or it holds no solid.
     """
     if not isinstance(getattr(of, "_native", None), _truefield.AdaptiveField):
         raise TruefieldError(f"csg.field takes an AdaptiveField, not {type(of).__name__}; make one with adaptive_field")

@@ -2,10 +2,13 @@
 
 mod shaped;
 
+use std::sync::Arc;
+
 use shaped::{ball, box_value, cuboid, near, torus, tree};
 use truefield::laws::{Random, check_threads};
 use truefield::product::collide::{Collision, Contact, collide};
-use truefield::{Aabb, DVec3, Distance, Error, Interval, Run};
+use truefield::source::csg::{Sphere, intersection};
+use truefield::{Aabb, DVec3, Distance, Error, Interval, Run, Source};
 
 const PLENTY: usize = 200_000;
 
@@ -121,4 +124,17 @@ fn collisions_do_not_depend_on_threads() {
         Ok((c.separation.lower.to_bits(), c.separation.upper.to_bits(), bits(c.first), bits(c.second), c.boxes))
     })
     .unwrap_or_else(|broken| panic!("{broken}"));
+}
+
+/// Two balls whose boxes overlap have nothing in common: the search for a way from nothing ends.
+#[test]
+fn nothing_is_never_met() {
+    let balls: [Arc<dyn Source>; 2] =
+        [DVec3::ZERO, DVec3::new(1.5, 1.5, 0.0)].map(|center| Arc::new(Sphere::new(center, 1.0).expect("a ball")) as Arc<dyn Source>);
+    let nothing = intersection(&balls).expect("boxes that overlap");
+    let other = Sphere::new(DVec3::new(5.0, 0.0, 0.0), 1.0).expect("a ball");
+    let found = collide(&nothing, &other, 0.1, 20_000, &Run::default()).expect("an answer");
+    assert_ne!(found.contact, Contact::Penetrating);
+    let found = collide(&other, &nothing, 0.1, 20_000, &Run::default()).expect("an answer");
+    assert_ne!(found.contact, Contact::Penetrating);
 }

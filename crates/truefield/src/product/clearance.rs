@@ -108,7 +108,8 @@ fn search(f: &dyn Distance, g: &dyn Distance, start: &Aabb, tolerance: f64, budg
     loop {
         known.lower = heap.peek().map_or(known.upper, |first| first.bound).min(known.upper);
         run.progress.report("search for the shortest way", known.boxes.min(budget), budget);
-        if !known.goes_on(tolerance) || known.boxes >= budget || patience.ends(known.boxes, known.upper - known.lower) {
+        // Nothing is left where the first solid is empty.
+        if heap.is_empty() || !known.goes_on(tolerance) || known.boxes >= budget || patience.ends(known.boxes, known.upper - known.lower) {
             return Ok(known);
         }
         let mut batch = Vec::with_capacity(8 * BATCH);

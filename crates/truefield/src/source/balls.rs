@@ -61,7 +61,10 @@ pub(crate) fn narrow(
     let radius = block.cell.radius();
     let center = node(block, |n| n / 2);
     let slope = slope(block, center, |_| Side::Middle);
-    if slope != DVec3::ZERO && off < radius {
+    if !(off < radius) {
+        return Ok(());
+    }
+    if slope != DVec3::ZERO {
         let ways = FAR.into_iter().flat_map(|far| [far * radius, -far * radius]);
         let far: Vec<DVec3> = ways.map(|way| block.points[center] + slope * way).collect();
         by_balls(block, off, &far, &ask, out)?;
@@ -92,17 +95,18 @@ fn by_balls(
 ) -> Result<()> {
     let mut there = vec![Interval::ALL; centers.len()];
     ask(centers, &mut there)?;
-    let known = || centers.iter().zip(&there).filter(|(q, there)| q.is_finite() && there.width().is_finite());
     let rounding = |q: DVec3| off + 16.0 * f64::EPSILON * q.abs().max(block.cell.max.abs()).max(block.cell.min.abs()).max_element();
-    let operands = |value: &dyn Fn(DVec3, Interval, f64) -> f64, between: Interval| -> Vec<Operand> {
-        let of = |(&q, &there): (&DVec3, &Interval)| Operand {
-            values: block.points.iter().map(|p| value(q, there, p.distance(q))).collect(),
+    // What is known at the centre of each ball, and the sign with which the way from there counts.
+    let operands = |end: &dyn Fn(&Interval) -> f64, sign: f64, between: Interval| -> Vec<Operand> {
+        let known = centers.iter().zip(there.iter().map(end)).filter(|(q, end)| q.is_finite() && end.is_finite());
+        let of = |(&q, end): (&DVec3, f64)| Operand {
+            values: block.points.iter().map(|p| end + sign * (p.distance(q) + rounding(q))).collect(),
             between: vec![between; block.len()],
         };
-        known().map(of).collect()
+        known.map(of).collect()
     };
-    let filled = operands(&|q, there, way| there.upper + way + rounding(q), Interval { lower: f64::NEG_INFINITY, upper: 0.0 });
-    let mut empty = operands(&|q, there, way| there.lower - way - rounding(q), Interval { lower: 0.0, upper: f64::INFINITY });
+    let filled = operands(&|there| there.upper, 1.0, Interval { lower: f64::NEG_INFINITY, upper: 0.0 });
+    let mut empty = operands(&|there| there.lower, -1.0, Interval { lower: 0.0, upper: f64::INFINITY });
     kink::least(block, &filled, Seam::Sharp, out);
     kink::greatest(block, &mut empty, Seam::Sharp, out);
     Ok(())

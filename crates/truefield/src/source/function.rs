@@ -188,6 +188,10 @@ impl<C: Callback> Source for Function<C> {
 
     fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
         block.residual(block.between(self.bend(&block.cell), self.noise()), out);
+        // Without a domain nothing is known of where it can be asked, but where a field asks it.
+        if self.domain.is_none() {
+            return Ok(());
+        }
         let ask = |points: &[DVec3], out: &mut [Interval]| {
             let found = self.answers(points)?;
             out.iter_mut().zip(found).for_each(|(out, (_, value))| *out = Interval::exact(value));

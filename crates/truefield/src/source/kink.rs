@@ -68,13 +68,17 @@ pub(crate) fn greatest(block: &SampleBlock<'_>, operands: &mut [Operand], seam: 
 }
 
 fn sharp(block: &SampleBlock<'_>, operands: &[Operand], number: usize, corners: &[usize; 8]) -> Interval {
+    if operands.is_empty() {
+        return Interval::ALL;
+    }
     let mut lower = f64::INFINITY;
     // The two with the least bounds: what they may exceed what is said by at the corners, and the larger of that.
     let mut best = [(f64::INFINITY, [0.0; 8]); 2];
     for operand in operands {
         let Interval { lower: below, upper: above } = operand.between[number];
         let apart = corners.map(|node| operand.values[node] - block.said[node]);
-        lower = lower.min(apart.iter().copied().fold(f64::INFINITY, f64::min) + below);
+        let least = apart.iter().copied().fold(f64::INFINITY, f64::min) + below;
+        lower = if least.is_nan() || apart.iter().any(|apart| apart.is_nan()) { f64::NEG_INFINITY } else { lower.min(least) };
         let apart = apart.map(|apart| apart + above);
         let most = apart.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if most < best[0].0 {

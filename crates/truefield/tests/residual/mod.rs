@@ -1,5 +1,8 @@
 //! Attacks on what shapes say between samples.
 
+// Each test file uses its own part of this.
+#![allow(dead_code)]
+
 use truefield::laws::Random;
 use truefield::{Aabb, DVec3, Interval, SampleBlock, Source};
 
@@ -14,6 +17,15 @@ pub fn residuals(name: &str, shape: &dyn Source, p: DVec3, size: f64, round: f64
     let edge = random.length(1e-3, 0.5) * size;
     let low = p - DVec3::new(random.unit(), random.unit(), random.unit()) * edge;
     let cell = Aabb::new(low, low + DVec3::new(0.1 + random.unit(), 0.1 + random.unit(), 0.1 + random.unit()) * edge);
+    attack(name, shape, &cell, edge, round, random);
+}
+
+/// The same for a given cell.
+pub fn aligned(shape: &dyn Source, cell: &Aabb, round: f64, random: &mut Random) {
+    attack("a field at its leaves", shape, cell, cell.size().x, round, random);
+}
+
+fn attack(name: &str, shape: &dyn Source, cell: &Aabb, edge: f64, round: f64, random: &mut Random) {
     let boxes = [1 + random.below(3), 1 + random.below(3), 1 + random.below(3)];
     let count = DVec3::from_array(boxes.map(|n| n as f64));
     let each = cell.size() / count;
@@ -27,7 +39,7 @@ pub fn residuals(name: &str, shape: &dyn Source, p: DVec3, size: f64, round: f64
     shape.values(&points, &mut values).expect("values");
     let off = edge * [0.0, 0.01, 1.0][random.below(3)];
     let said: Vec<f64> = values.iter().map(|value| value + off * (random.unit() - 0.5)).collect();
-    let block = SampleBlock { cell, points: &points, values: &values, said: &said, boxes, square: each.length_squared() };
+    let block = SampleBlock { cell: *cell, points: &points, values: &values, said: &said, boxes, square: each.length_squared() };
     let mut out = vec![Interval::ALL; block.len()];
     shape.residual(&block, &mut out).expect("residuals");
     block.each_box(|number, corners| {

@@ -265,8 +265,7 @@ impl Builder<'_> {
         let extent = self.root.cell(self.depth, draft.index);
         let block = self.layout.block(&extent, draft.points, draft.samples);
         let noise = self.source.noise_over(&extent);
-        // What the shape itself leaves open, no division makes less.
-        let allowed = self.rules.allowed(Layout::least(&block, noise)) + 2.0 * noise;
+        let allowed = self.rules.allowed(Layout::least(&block, noise)) + Layout::left_open(&extent, noise);
         let corners = self.layout.corners(draft.samples).map(|v| v as f32);
         let last = self.depth == self.rules.max_depth;
         let linear = self.layout.linear(&corners);

@@ -106,6 +106,11 @@ impl Layout {
         (least - 0.5 * block.square.sqrt() * (1.0 + 1e-12) - noise).max(0.0)
     }
 
+    /// What no division makes less, in a cell that is as fine as the `noise` of its values.
+    pub fn left_open(cell: &Aabb, noise: f64) -> f64 {
+        if noise.is_finite() && noise >= 0.5 * cell.radius() { 2.0 * noise } else { 0.0 }
+    }
+
     /// By trilinear interpolation of the corners.
     pub fn linear(self, corners: &[f32; 8]) -> Said {
         let c = corners.map(f64::from);

@@ -28,6 +28,9 @@ impl Solid {
         if field.continuity() == Continuity::ExceptOpenings {
             return Err(Error::invalid("the field is of a mesh with openings, which has no definite inside; close the mesh first"));
         }
+        if field.division() == Division::Quadtree {
+            return Err(Error::invalid("the field is one of columns, the same at every height; give the polygon that it is of"));
+        }
         if field.coverage() != Coverage::Whole {
             return Err(Error::invalid(
                 "the field may not hold all of its solid, which reaches beyond the domain or is not known not to; give it a larger domain",
@@ -47,9 +50,6 @@ impl Solid {
         });
         if extent == Aabb::EMPTY {
             return Err(Error::invalid("the field holds no solid: it is positive everywhere"));
-        }
-        if field.division() == Division::Quadtree {
-            (extent.min.z, extent.max.z) = (f64::NEG_INFINITY, f64::INFINITY);
         }
         Ok(Self { field, extent, noise })
     }
@@ -73,12 +73,17 @@ impl Solid {
         p.clamp(self.field.root.extent.min, self.field.root.extent.max)
     }
 
-    /// The leaves that share more than a face with a box of the domain, while they are no more than some.
+    /// Whether a box is a part of the domain.
+    fn holds(&self, cell: &Aabb) -> bool {
+        self.field.root.extent.contains(cell.min) && self.field.root.extent.contains(cell.max)
+    }
+
+    /// The leaves that touch a box of the domain, while they are no more than some.
     fn leaves_of(&self, part: &Aabb, most: usize) -> Option<Vec<Cell<'_>>> {
         let (mut found, mut stack) = (Vec::new(), vec![self.field.root()]);
         while let Some(cell) = stack.pop() {
             let extent = cell.extent();
-            if !(extent.min.cmplt(part.max).all() && part.min.cmplt(extent.max).all()) {
+            if !extent.overlaps(part) {
                 continue;
             }
             if cell.is_leaf() {
@@ -95,18 +100,14 @@ impl Solid {
     /// Between nodes of a block, what the field says minus its interpolation: a way to a node crosses each leaf once, climbs
     /// no more than the leaf does, and jumps where it leaves one for another.
     fn between(&self, block: &SampleBlock<'_>) -> Option<Interval> {
-        if !(self.field.root.extent.contains(block.cell.min) && self.field.root.extent.contains(block.cell.max)) {
+        let cell = &block.cell;
+        if !self.holds(cell) {
             return None;
         }
-        let leaves = self.leaves_of(&block.cell, FEW)?;
+        // Those that only touch it say what the nodes of a face are.
+        let leaves = self.leaves_of(cell, FEW)?;
         if leaves.iter().any(|leaf| matches!(leaf.leaf(), Leaf::Exact(_))) {
             return None;
-        }
-        if let [leaf] = leaves[..]
-            && leaf.leaf() == Leaf::Linear
-            && block.is_upright()
-        {
-            return Some(Interval::exact(0.0).widen(self.field.rounding(block.cell.max)));
         }
         let mut jump = 0.0f64;
         for (number, a) in leaves.iter().enumerate() {
@@ -114,9 +115,15 @@ impl Solid {
                 jump = jump.max(apart(a, b)?);
             }
         }
+        let rounding = self.field.rounding(cell.max);
+        let alone =
+            leaves.iter().any(|leaf| leaf.leaf() == Leaf::Linear && leaf.extent().contains(cell.min) && leaf.extent().contains(cell.max));
+        if alone && block.is_upright() {
+            return Some(Interval::either_side(2.0 * jump + rounding));
+        }
         let steepest = leaves.iter().map(|leaf| leaf.steepest()).fold(0.0, f64::max);
-        let jumps = jump * (leaves.len() - 1) as f64;
-        Some(Interval::either_side((0.5 * steepest * block.square.sqrt() + jumps) * (1.0 + 1e-9)))
+        let jumps = jump * leaves.len() as f64;
+        Some(Interval::either_side((0.5 * steepest * block.square.sqrt() + jumps) * (1.0 + 1e-9) + rounding))
     }
 }
 
@@ -172,11 +179,11 @@ impl Source for Solid {
 
     /// The errors of all leaves there; outside the domain from what is known in the middle.
     fn slack(&self, cell: &Aabb) -> Interval {
-        if !(self.field.root.extent.contains(cell.min) && self.field.root.extent.contains(cell.max)) {
+        if !self.holds(cell) {
             let (center, moved) = (cell.center(), 2.0 * cell.radius() * (1.0 + 1e-12));
             let value = self.extended(center);
             let Interval { lower, upper } = self.at(center);
-            return Interval { lower: lower - value, upper: upper - value }.widen(moved + self.noise());
+            return Interval { lower: lower - value, upper: upper - value }.widen(moved + 2.0 * self.noise);
         }
         let mut slack = Interval::exact(0.0);
         self.field.walk(&mut |at| {
@@ -198,10 +205,6 @@ impl Source for Solid {
         Ok(())
     }
 
-    fn is_flat(&self) -> bool {
-        self.field.root.division == Division::Quadtree
-    }
-
     /// Next to the surface an error is enough to turn the sign.
     fn sided(&self) -> bool {
         false
@@ -213,7 +216,10 @@ impl Source for Solid {
     }
 
     fn noise_over(&self, cell: &Aabb) -> f64 {
+        if !self.holds(cell) {
+            return self.noise;
+        }
         let slack = self.slack(cell);
-        slack.upper.max(-slack.lower)
+        slack.upper.max(-slack.lower).min(self.noise)
     }
 }

@@ -279,8 +279,7 @@ impl<'a> Divider<'a> {
         let of_tool = self.tool.noise_over(extent);
         let noise = of_tool + 0.25 * (steep - 1.0).max(0.0) * block.square.sqrt() * (1.0 + 1e-12);
         let accuracy = self.field.accuracy();
-        // What the tool itself leaves open, no division makes less.
-        let allowed = accuracy.allowed(Layout::least(&block, noise)) + 2.0 * of_tool;
+        let allowed = accuracy.allowed(Layout::least(&block, noise)) + Layout::left_open(extent, of_tool);
         let last = piece.depth >= accuracy.max_depth.min(MAX_DEPTH);
         if worst > allowed && !last {
             return Ok(Outcome::Divide);
