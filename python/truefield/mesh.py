@@ -139,8 +139,8 @@ def _points(vertices: ArrayLike) -> Array:
         raise TruefieldError("the mesh has no vertices; give at least three")
     if len(points) > _MOST_VERTICES:
         raise TruefieldError(f"the mesh has {len(points)} vertices, more than 2^32 - 1; split it")
-    finite = np.isfinite(points).all(axis=1)
-    if not finite.all():
+    if not np.isfinite(points).all():
+        finite = np.isfinite(points).all(axis=1)
         index = int(np.argmin(finite))
         x, y, z = points[index].tolist()
         raise TruefieldError(
@@ -161,9 +161,8 @@ def _indices(triangles: ArrayLike, count: int) -> NDArray[np.int64]:
         raise TruefieldError(f"triangles has shape {given.shape}; give vertex indices of shape (m, 3)")
     if given.dtype.kind not in "iu":
         raise TruefieldError(f"triangles has dtype {given.dtype}; give integer vertex indices of shape (m, 3)")
-    outside = ((given < 0) | (given >= count)).any(axis=1)
-    if outside.any():
-        index = int(np.argmax(outside))
+    if given.min() < 0 or given.max() >= count:
+        index = int(np.argmax(((given < 0) | (given >= count)).any(axis=1)))
         raise TruefieldError(
             f"triangle {index} refers to vertices {given[index].tolist()} but the mesh has only {count} vertices "
             f"(0 to {count - 1})"
@@ -172,20 +171,27 @@ def _indices(triangles: ArrayLike, count: int) -> NDArray[np.int64]:
 
 
 def _extent(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, Array]:
-    corners = vertices[triangles]
-    lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    used = np.zeros(len(vertices), dtype=bool)
+    used[triangles] = True
+    there = vertices if used.all() else vertices[used]
+    lower, upper = there.min(axis=0), there.max(axis=0)
     with np.errstate(over="ignore"):
         diagonal = float(np.linalg.norm(upper - lower))
     if not 0.0 < diagonal < np.inf:
         raise TruefieldError(
             f"the mesh spans a box with a diagonal of {diagonal}; it must have a positive, finite extent"
         )
-    # An overflow gives infinity or, of two, NaN: neither is zero, and both come from corners apart.
-    with np.errstate(over="ignore", invalid="ignore"):
-        area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    if not area.any():
+    # The first few nearly always have an area.
+    if not any(_has_area(vertices[some]) for some in (triangles[:64], triangles[64:])):
         raise TruefieldError(f"all {len(triangles)} triangles of the mesh have zero area; it has no surface")
     return _frozen(lower), _frozen(upper)
+
+
+def _has_area(corners: Array) -> bool:
+    """Whether any of (m, 3, 3) triangles has an area."""
+    # An overflow gives infinity or, of two, NaN: neither is zero, and both come from corners apart.
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]).any())
 
 
 def _frozen(array: NDArray[_Scalar]) -> NDArray[_Scalar]:

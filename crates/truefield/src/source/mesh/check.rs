@@ -1,5 +1,7 @@
 //! What is wrong with a mesh.
 
+use std::borrow::Borrow;
+
 use crate::bvh::Tree;
 use crate::bvh::intersect::Meetings;
 use crate::bvh::winding::{Winding, triangle};
@@ -11,6 +13,7 @@ use crate::run::Run;
 
 use super::layers::Layers;
 use super::pseudonormal::rounding;
+use super::sum::winding;
 use super::well_sized;
 
 /// Finds that are named; the others are only counted.
@@ -104,16 +107,15 @@ impl Check {
         let topology = Topology::new(mesh);
         run.cancel.check()?;
         let mut check = Self::of_edges(mesh, &topology);
-        let winding = Winding::build(&Layers::new(mesh, &topology).corners(mesh), run)?;
-        check.add_shells(mesh, &topology, &winding, run)?;
         let tree = Tree::build(mesh, run)?;
-        check.add_intersections(mesh, &topology, &tree, 0.0, run)?;
+        check.add_meetings(mesh, &meetings(mesh, &topology, &tree, 0.0, run)?);
+        check.add_shells(mesh, &topology, || winding(mesh, &Layers::new(mesh, &topology).triangles, run), run)?;
         check.area /= scale * scale;
         check.volume /= scale * scale * scale;
         Ok(check)
     }
 
-    /// All but the order of shells and self-intersections. O(n).
+    /// All but shells and self-intersections. O(n).
     pub(crate) fn of_edges(mesh: &TriangleMesh, topology: &Topology) -> Self {
         let mut check = Self {
             vertices: mesh.vertices().len(),
@@ -184,8 +186,14 @@ impl Check {
         }
     }
 
-    /// Counts the shells and asks, at the largest triangle of each closed one, what is on either side.
-    pub(crate) fn add_shells(&mut self, mesh: &TriangleMesh, topology: &Topology, winding: &Winding, run: &Run<'_>) -> Result<()> {
+    /// Counts the shells and asks, at the largest triangle of each closed one, what is on either side; last of all.
+    pub(crate) fn add_shells<W: Borrow<Winding>>(
+        &mut self,
+        mesh: &TriangleMesh,
+        topology: &Topology,
+        winding: impl FnOnce() -> Result<W>,
+        run: &Run<'_>,
+    ) -> Result<()> {
         let count = topology.triangles.len();
         let mut sets = Sets::new(count);
         for sides in topology.edges() {
@@ -210,6 +218,19 @@ impl Check {
         let shells: Vec<(u32, u32)> =
             (0..count as u32).filter(|&s| largest[s as usize].1 != u32::MAX).map(|s| (s, largest[s as usize].1)).collect();
         self.shells = shells.len();
+        // A single surface that nothing is wrong with parts space in two, and its volume tells which part is inside.
+        let rounding = 4.0 * f64::EPSILON * (count + 64) as f64 * self.area * mesh.extent().diagonal();
+        if let &[(shell, _)] = &shells[..]
+            && self.volume.abs() > rounding
+            && self.fault().is_none()
+        {
+            if self.volume < 0.0 {
+                self.inside_out_shells.add(shell);
+            }
+            return Ok(());
+        }
+        let winding = winding()?;
+        let winding = winding.borrow();
         const CHUNK: usize = 64;
         let middles = run.blocks("shells", shells.len().div_ceil(CHUNK), |block| {
             let part = &shells[block * CHUNK..((block + 1) * CHUNK).min(shells.len())];
@@ -227,28 +248,12 @@ impl Check {
         Ok(())
     }
 
-    /// Looks for self-intersections of a mesh that was `moved` so far from the one the tree is of.
-    pub(crate) fn add_intersections(
-        &mut self,
-        mesh: &TriangleMesh,
-        topology: &Topology,
-        tree: &Tree,
-        moved: f64,
-        run: &Run<'_>,
-    ) -> Result<Meetings> {
-        let mut solid: Vec<bool> = topology.triangles.iter().map(|welded| !collapsed(welded)).collect();
-        for copies in topology.copies() {
-            for &t in copies.even.iter().chain(&copies.odd).skip(1) {
-                solid[t as usize] = false;
-            }
-        }
-        let reach = (mesh.extent().diagonal() * REACH).max(64.0 * rounding(mesh));
-        let meetings = Meetings::find(mesh, topology, tree, &solid, [reach, moved], run)?;
+    /// Counts self-intersections.
+    pub(crate) fn add_meetings(&mut self, mesh: &TriangleMesh, meetings: &Meetings) {
         for &pair in meetings.pairs.iter().filter(|pair| pair.iter().all(|&t| !flat(&mesh.corners(t)))) {
             self.self_intersections.add(pair);
         }
         self.self_intersections_complete = meetings.complete;
-        Ok(meetings)
     }
 
     /// The first thing that keeps angle-weighted pseudonormals from being proven, in words.
@@ -286,6 +291,18 @@ impl Check {
         let what = if count == 1 { singular } else { plural };
         Some(format!("{most}{count} {what} ({})", first.unwrap_or_default()))
     }
+}
+
+/// Where a mesh, `moved` so far from the one the tree is of, meets itself.
+pub(crate) fn meetings(mesh: &TriangleMesh, topology: &Topology, tree: &Tree, moved: f64, run: &Run<'_>) -> Result<Meetings> {
+    let mut solid: Vec<bool> = topology.triangles.iter().map(|welded| !collapsed(welded)).collect();
+    for copies in topology.copies() {
+        for &t in copies.even.iter().chain(&copies.odd).skip(1) {
+            solid[t as usize] = false;
+        }
+    }
+    let reach = (mesh.extent().diagonal() * REACH).max(64.0 * rounding(mesh));
+    Meetings::find(mesh, topology, tree, &solid, [reach, moved], run)
 }
 
 /// Triangles farther apart than this share of the diagonal need not be compared.

@@ -1,6 +1,5 @@
 //! Which triangles the winding number sums, and the edges that bound them.
 
-use crate::geom::DVec3;
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::{Sets, Topology, collapsed};
 
@@ -83,10 +82,5 @@ impl Layers {
             }
         }
         alone
-    }
-
-    /// The corners of the triangles that count.
-    pub fn corners(&self, mesh: &TriangleMesh) -> Vec<[DVec3; 3]> {
-        self.triangles.iter().map(|&t| mesh.corners(t)).collect()
     }
 }

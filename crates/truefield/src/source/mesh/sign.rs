@@ -1,15 +1,15 @@
 //! Which side of a mesh a point is on.
 
+use std::sync::Arc;
+
 use crate::bvh::Tree;
-use crate::bvh::intersect::Meetings;
-use crate::bvh::winding::Winding;
 use crate::error::Result;
 use crate::geom::{DVec3, FacetPoint};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
 
-use super::check::Check;
+use super::check::{Check, meetings};
 use super::layers::Layers;
 use super::pseudonormal::{Proof, Pseudonormals};
 use super::sum::Sum;
@@ -101,7 +101,7 @@ struct Decided {
     walls: Walls,
     sum: Sum,
     /// The mesh that sides are decided on, where it is not the mesh itself.
-    joined: Option<TriangleMesh>,
+    joined: Option<Arc<TriangleMesh>>,
 }
 
 /// What pseudonormals mean.
@@ -123,7 +123,7 @@ impl Signs {
     }
 
     /// Finds the rule and prepares it, for a choice with sides. O(n log n).
-    pub fn new(mesh: &TriangleMesh, mut topology: Topology, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
+    pub fn new(mesh: &Arc<TriangleMesh>, mut topology: Topology, tree: &Tree, choice: SignChoice, run: &Run<'_>) -> Result<Self> {
         run.cancel.check()?;
         let joined = if choice == SignChoice::Pseudonormal || topology.is_closed() { None } else { join_vertices(mesh)? };
         let moved = joined.as_ref().map_or(0.0, |joined| joined.within);
@@ -131,26 +131,28 @@ impl Signs {
         if joined.is_some() {
             topology = Topology::new(mesh);
         }
-        let sums = || {
-            let layers = Layers::new(mesh, &topology);
-            let sum = Sum::new(mesh, &layers, run)?;
-            Ok((layers, sum))
-        };
         let edges = || {
             let check = Check::of_edges(mesh, &topology);
             run.cancel.check()?;
-            Ok((check, Pseudonormals::new(mesh, &topology)))
+            let normals = Pseudonormals::new(mesh, &topology);
+            run.cancel.check()?;
+            Ok((check, normals, Layers::new(mesh, &topology)))
         };
-        let ((layers, sum), (check, normals)) = run.both(sums, edges)?;
+        let (meetings, (mut check, normals, layers)) = run.both(|| meetings(mesh, &topology, tree, moved, run), edges)?;
+        check.add_meetings(mesh, &meetings);
+        let (alone, sum) = (layers.alone(mesh, &topology), Sum::new(mesh, layers, run)?);
         let closed = sum.boundary.is_empty();
-        let (fault, meetings) = look(check, mesh, &topology, tree, &sum.winding, moved, run)?;
+        if check.fault().is_none() {
+            check.add_shells(mesh, &topology, || sum.winding(run), run)?;
+        }
+        let fault = check.fault();
         let rule = rule(choice, fault.as_deref(), joined.as_ref(), closed);
         let (normals, walls) = if fault.is_some() && rule.kind == SignKind::Pseudonormal {
             (normals, Walls::Trusted)
         } else {
-            let sound = meetings.sound(layers.alone(mesh, &topology));
+            let sound = meetings.sound(alone);
             let normals = normals.prove(&topology, &Proof { meetings: &meetings, sound: &sound, moved });
-            let known = || walls(mesh, &topology, tree, &sound, &sum.winding, &sum.boundary, run).map(Walls::Known);
+            let known = || walls(mesh, &topology, tree, &sound, &sum, run).map(Walls::Known);
             (normals, if fault.is_none() { Walls::Clean } else { known()? })
         };
         let parted = closed && !matches!(walls, Walls::Trusted);
@@ -237,26 +239,6 @@ impl Signs {
     }
 }
 
-/// The first thing that keeps pseudonormals from being proven for the whole mesh, cheap conditions first, and where its triangles
-/// meet; `check` has seen its edges.
-fn look(
-    mut check: Check,
-    mesh: &TriangleMesh,
-    topology: &Topology,
-    tree: &Tree,
-    winding: &Winding,
-    moved: f64,
-    run: &Run<'_>,
-) -> Result<(Option<String>, Meetings)> {
-    let mut fault = check.fault();
-    if fault.is_none() {
-        check.add_shells(mesh, topology, winding, run)?;
-        fault = check.fault();
-    }
-    let meetings = check.add_intersections(mesh, topology, tree, moved, run)?;
-    Ok((fault.or_else(|| check.fault()), meetings))
-}
-
 /// The rule, and why it is in force.
 fn rule(choice: SignChoice, fault: Option<&str>, joined: Option<&Joined>, closed: bool) -> SignRule {
     let note = joined.map(|joined| format!("vertices within {:.1e} of each other were taken for one to decide sides", joined.within));
@@ -292,7 +274,7 @@ impl Decided {
         if left <= 0.0 {
             return None;
         }
-        let height = self.normals.side(self.joined.as_ref().unwrap_or(mesh), p, nearest, triangle)?;
+        let height = self.normals.side(self.joined.as_deref().unwrap_or(mesh), p, nearest, triangle)?;
         Some((wall.side(height), left))
     }
 }
@@ -305,7 +287,7 @@ const BLUR: f64 = 16.0;
 
 /// A mesh whose vertices were joined, for deciding sides only.
 struct Joined {
-    mesh: TriangleMesh,
+    mesh: Arc<TriangleMesh>,
     within: f64,
 }
 
@@ -337,7 +319,7 @@ fn join_vertices(mesh: &TriangleMesh) -> Result<Option<Joined>> {
     }
     let triangles = mesh.triangles().iter().map(|t| t.map(|v| partner[v as usize])).collect();
     // Where joining leaves nothing of the surface the mesh is taken as it is.
-    Ok(TriangleMesh::new(vertices.to_vec(), triangles).ok().map(|mesh| Joined { mesh, within }))
+    Ok(TriangleMesh::new(vertices.to_vec(), triangles).ok().map(|mesh| Joined { mesh: Arc::new(mesh), within }))
 }
 
 #[cfg(test)]
@@ -387,13 +369,14 @@ mod tests {
     }
 
     struct Asked {
-        mesh: TriangleMesh,
+        mesh: Arc<TriangleMesh>,
         tree: Tree,
         signs: Signs,
     }
 
     impl Asked {
         fn new(mesh: TriangleMesh, choice: SignChoice) -> Self {
+            let mesh = Arc::new(mesh);
             let tree = Tree::build(&mesh, &Run::default()).expect("a tree");
             let signs = match choice {
                 SignChoice::Unsigned => Signs::none(),

@@ -1,5 +1,7 @@
 //! Sides by winding numbers: what is left where no triangle can tell.
 
+use std::sync::{Arc, OnceLock};
+
 use crate::bvh::boundary::Boundary;
 use crate::bvh::winding::{Estimate, Winding};
 use crate::error::Result;
@@ -20,18 +22,37 @@ const CAPPED: usize = 4;
 /// rough sum over the surface and a good one over the small cap tell the winding number of the surface well.
 #[derive(Clone, Debug)]
 pub(crate) struct Sum {
-    pub winding: Winding,
+    mesh: Arc<TriangleMesh>,
+    /// The triangles that count.
+    triangles: Vec<u32>,
+    /// Made when first asked for: sound surfaces seldom need it.
+    winding: OnceLock<Winding>,
     pub boundary: Boundary,
     cap: Option<Winding>,
     extent: Aabb,
 }
 
 impl Sum {
-    pub fn new(mesh: &TriangleMesh, layers: &Layers, run: &Run<'_>) -> Result<Self> {
-        let winding = Winding::build(&layers.corners(mesh), run)?;
+    pub fn new(mesh: &Arc<TriangleMesh>, layers: Layers, run: &Run<'_>) -> Result<Self> {
         let small = CAPPED * layers.boundary.len() <= layers.triangles.len();
         let cap = if small && !layers.boundary.is_empty() { Some(Winding::build(&cap(mesh, &layers.boundary), run)?) } else { None };
-        Ok(Self { winding, boundary: Boundary::new(mesh, &layers.boundary), cap, extent: mesh.extent() })
+        let boundary = Boundary::new(mesh, &layers.boundary);
+        Ok(Self { mesh: Arc::clone(mesh), triangles: layers.triangles, winding: OnceLock::new(), boundary, cap, extent: mesh.extent() })
+    }
+
+    /// The winding numbers of the surface.
+    pub fn winding(&self, run: &Run<'_>) -> Result<&Winding> {
+        if let Some(made) = self.winding.get() {
+            return Ok(made);
+        }
+        let made = winding(&self.mesh, &self.triangles, run)?;
+        Ok(self.winding.get_or_init(|| made))
+    }
+
+    /// [`Winding::refine`]; nothing is known where the winding numbers cannot be had.
+    fn refine(&self, p: DVec3, enough: impl Fn(Estimate) -> bool) -> Estimate {
+        let unknown = Estimate { value: 0.0, error: f64::INFINITY, doubt: f64::INFINITY };
+        self.winding(&Run::default()).map_or(unknown, |winding| winding.refine(p, enough))
     }
 
     pub fn side(&self, p: DVec3) -> Side {
@@ -41,7 +62,7 @@ impl Sum {
                 return Side::Outside;
             }
             let whole = |e: Estimate| (e.value.abs() > e.error, e.value.abs() + e.error < 1.0);
-            let e = self.winding.refine(p, |e| matches!(whole(e), (true, _) | (_, true)) || hopeless(e));
+            let e = self.refine(p, |e| matches!(whole(e), (true, _) | (_, true)) || hopeless(e));
             return match whole(e) {
                 (true, _) => Side::Inside,
                 (_, true) => Side::Outside,
@@ -76,10 +97,17 @@ impl Sum {
         decided(e).then(|| guess(e).certain())
     }
 
+    /// A winding number at `p`, known to less than a half, once more to within `accuracy`: with the cap's it is whole.
+    pub fn sharpen(&self, p: DVec3, (value, error): (f64, f64), accuracy: f64) -> Option<(f64, f64)> {
+        let cap = self.cap.as_ref().filter(|_| error < 0.5)?;
+        let c = cap.number(p, accuracy);
+        (c.error <= accuracy && error + c.error < 0.499).then(|| ((value + c.value).round() - c.value, c.error))
+    }
+
     /// The winding number around `p`, until `enough` or until rounding is all that is left.
     fn number(&self, p: DVec3, enough: impl Fn(Estimate) -> bool) -> Estimate {
         if let Some(cap) = &self.cap {
-            let rough = self.winding.refine(p, |e| enough(e) || e.error < 0.25 || hopeless(e));
+            let rough = self.refine(p, |e| enough(e) || e.error < 0.25 || hopeless(e));
             if enough(rough) {
                 return rough;
             }
@@ -91,8 +119,14 @@ impl Sum {
                 return known(c);
             }
         }
-        self.winding.refine(p, |e| enough(e) || hopeless(e))
+        self.refine(p, |e| enough(e) || hopeless(e))
     }
+}
+
+/// Winding numbers of some triangles of a mesh.
+pub(crate) fn winding(mesh: &TriangleMesh, triangles: &[u32], run: &Run<'_>) -> Result<Winding> {
+    let corners: Vec<[DVec3; 3]> = triangles.iter().map(|&t| mesh.corners(t)).collect();
+    Winding::build(&corners, run)
 }
 
 /// Cones over the boundary, one for each piece that hangs together: with them the surface is closed.

@@ -8,7 +8,6 @@
 
 use crate::bvh::Tree;
 use crate::bvh::boundary::Boundary;
-use crate::bvh::winding::Winding;
 use crate::error::Result;
 use crate::geom::DVec3;
 use crate::mesh::TriangleMesh;
@@ -17,6 +16,7 @@ use crate::run::Run;
 
 use super::check::between;
 use super::sign::Side;
+use super::sum::Sum;
 
 /// Winding numbers are handed on while they are known this well.
 const HANDED: f64 = 0.15;
@@ -78,15 +78,8 @@ impl Spot {
 }
 
 /// The walls of all triangles. O(n), and one winding number for each sound piece of a closed surface.
-pub(crate) fn walls(
-    mesh: &TriangleMesh,
-    topology: &Topology,
-    tree: &Tree,
-    sound: &[bool],
-    winding: &Winding,
-    boundary: &Boundary,
-    run: &Run<'_>,
-) -> Result<Vec<Wall>> {
+pub(crate) fn walls(mesh: &TriangleMesh, topology: &Topology, tree: &Tree, sound: &[bool], sum: &Sum, run: &Run<'_>) -> Result<Vec<Wall>> {
+    let boundary = &sum.boundary;
     // Triangles of a leaf share what is known of the boundary.
     let groups = tree.leaves().map(|triangles| triangles.iter().copied().filter(|&t| sound[t as usize]).collect::<Vec<u32>>());
     let groups: Vec<Vec<u32>> = groups.filter(|group| !group.is_empty()).collect();
@@ -107,7 +100,7 @@ pub(crate) fn walls(
             spots[t as usize] = spot;
         }
     }
-    let known = hand_on(mesh, topology, &spots, winding, run)?;
+    let known = hand_on(mesh, topology, &spots, sum, run)?;
     let reached = run.blocks("decide sides", groups.len().div_ceil(CHUNK), |block| {
         let start = block * CHUNK;
         let each = chunk(block).iter().zip(&groups_at[start..]).map(|(group, at)| {
@@ -132,7 +125,8 @@ pub(crate) fn walls(
 }
 
 /// The winding number on the outer side of each triangle at its middle, and how wrong it may be.
-fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], winding: &Winding, run: &Run<'_>) -> Result<Vec<Option<(f64, f64)>>> {
+fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], sum: &Sum, run: &Run<'_>) -> Result<Vec<Option<(f64, f64)>>> {
+    let winding = sum.winding(run)?;
     let mut across = vec![[(u32::MAX, DVec3::ZERO); 3]; spots.len()];
     for sides in topology.edges() {
         if let [a, b] = sides
@@ -165,8 +159,9 @@ fn hand_on(mesh: &TriangleMesh, topology: &Topology, spots: &[Spot], winding: &W
                 if next < spots.len() && known[next].is_none() {
                     let step = |spot: &Spot| (middle - spot.center).length() * spot.steepest;
                     let error = error + (step(&spots[t]) + step(&spots[next])) * (1.0 + 1e-9);
-                    if error <= HANDED {
-                        known[next] = Some((value, error));
+                    known[next] =
+                        if error <= HANDED { Some((value, error)) } else { sum.sharpen(spots[next].center, (value, error), ASKED) };
+                    if known[next].is_some() {
                         queue.push_back(next);
                     }
                 }
@@ -185,7 +180,7 @@ struct Steps<'a> {
 }
 
 /// Radii of the balls, as parts of the distance to the nearest edge that bounds the surface.
-const SHARES: [f64; 5] = [0.8, 0.6, 0.4, 0.25, 0.15];
+const SHARES: [f64; 5] = [0.15, 0.25, 0.4, 0.6, 0.8];
 
 impl<'a> Steps<'a> {
     fn new(at: &Spot, boundary: &'a Boundary) -> Self {
@@ -204,14 +199,16 @@ impl<'a> Steps<'a> {
         }
         let off = (spot.center - self.center).length() * (1.0 + 1e-9);
         let mut best = 0.0f64;
-        for (share, steepest) in SHARES.into_iter().zip(&mut self.steepest) {
+        // The larger the ball, the more room there is, and the steeper it gets.
+        let (mut from, mut to) = (0, SHARES.len());
+        while from < to {
+            let middle = (from + to) / 2;
+            let radius = SHARES[middle] * self.gap;
+            let steepest = *self.steepest[middle].get_or_insert_with(|| self.boundary.steepest(self.center, radius));
             // Paths from the middle of the triangle that stay in the ball.
-            let room = share * self.gap - off;
-            if room <= best {
-                break;
-            }
-            let steepest = *steepest.get_or_insert_with(|| self.boundary.steepest(self.center, share * self.gap));
-            best = best.max(room.min(left / steepest));
+            let (room, path) = (radius - off, left / steepest);
+            best = best.max(room.min(path));
+            if room <= path { from = middle + 1 } else { to = middle }
         }
         let reach = best * (1.0 - 1e-9) - spot.radius;
         if reach > 0.0 { Wall { winding, reach: (reach as f32).next_down() } } else { Wall::UNKNOWN }
