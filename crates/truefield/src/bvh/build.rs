@@ -276,7 +276,7 @@ impl Node {
 }
 
 impl Packet {
-    const EMPTY: Self = {
+    pub(super) const EMPTY: Self = {
         let zero = [[0.0; WIDTH]; 3];
         Self { a: zero, ab: zero, ac: zero, v: zero, inverse: zero, slope: [0.0; WIDTH], triangle: [0; WIDTH], first: 0, count: 0 }
     };
@@ -285,17 +285,21 @@ impl Packet {
         (self.first, self.count) = (first, count);
         for lane in 0..WIDTH {
             let slot = (first + (lane as u32).min(count - 1)) as usize;
-            let facet = &facets[slot];
-            for axis in 0..3 {
-                self.a[axis][lane] = facet.a[axis];
-                self.ab[axis][lane] = facet.ab[axis];
-                self.ac[axis][lane] = facet.ac[axis];
-                self.v[axis][lane] = facet.v[axis];
-                self.inverse[axis][lane] = facet.inverse[axis];
-            }
-            self.slope[lane] = facet.slope;
-            self.triangle[lane] = triangles[slot];
+            self.set(lane, &facets[slot], triangles[slot]);
         }
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, facet: &Facet, triangle: u32) {
+        for axis in 0..3 {
+            self.a[axis][lane] = facet.a[axis];
+            self.ab[axis][lane] = facet.ab[axis];
+            self.ac[axis][lane] = facet.ac[axis];
+            self.v[axis][lane] = facet.v[axis];
+            self.inverse[axis][lane] = facet.inverse[axis];
+        }
+        self.slope[lane] = facet.slope;
+        self.triangle[lane] = triangle;
     }
 }
 

@@ -10,6 +10,7 @@ mod frame;
 pub(crate) mod intersect;
 mod nearest;
 pub(crate) mod order;
+pub(crate) mod pairs;
 mod ray;
 pub(crate) mod tree;
 pub mod winding;

@@ -6,13 +6,10 @@
 
 use std::sync::Arc;
 
-use super::each::each_along;
 use crate::bvh::Candidate;
 use crate::distance::{Closest, Distance};
-use crate::error::Result;
-use crate::geom::{Aabb, DVec3, FacetPoint, Interval, Nearest};
+use crate::geom::{Aabb, DVec3, Interval, Nearest};
 use crate::grid::Grid;
-use crate::run::Run;
 use crate::source::mesh::{Side, Surface};
 
 /// Cells along an edge of a block.
@@ -184,7 +181,7 @@ pub(crate) fn block_range(grid: &Grid) -> ([i64; 3], [usize; 3]) {
 }
 
 /// A cell's triangles, or where to start a search.
-enum Found<'a> {
+pub(super) enum Found<'a> {
     List(&'a CellBlock, usize),
     Start(u32),
 }
@@ -229,7 +226,7 @@ impl CompleteField {
     }
 
     /// The list of the cell that holds `p` (model units), and the cell's class.
-    fn find(&self, p: DVec3) -> (Found<'_>, CellClass) {
+    pub(super) fn find(&self, p: DVec3) -> (Found<'_>, CellClass) {
         let index = (p - self.grid.origin) / self.grid.spacing;
         let mut cell = [0; 3];
         for axis in 0..3 {
@@ -250,7 +247,7 @@ impl CompleteField {
         (found, class)
     }
 
-    /// Nearest triangle of `p`; all in the tree's units but `find`.
+    /// Nearest triangle of `p`; all in the tree's units but `p`.
     #[inline]
     fn search(&self, p: DVec3) -> (Candidate, CellClass) {
         let (found, class) = self.find(p);
@@ -271,37 +268,23 @@ impl CompleteField {
         (best, class)
     }
 
-    fn side(&self, p: DVec3, class: CellClass, found: Candidate, foot: impl FnOnce() -> FacetPoint) -> Side {
-        match class {
+    /// The unsigned distance of `p` and its side, by its nearest triangle and the class of its cell.
+    pub(super) fn sided(&self, p: DVec3, found: Candidate, class: CellClass) -> (f64, Side) {
+        let (surface, scale) = (&self.surface, self.surface.scale());
+        let side = match class {
             CellClass::Inside => Side::Inside,
             CellClass::Outside => Side::Outside,
-            CellClass::Surface | CellClass::Undecided => self.surface.side(p * self.surface.scale(), &foot(), found.triangle),
-        }
-    }
-
-    fn distance_and_side(&self, p: DVec3) -> (f64, Side) {
-        let (found, class) = self.search(p);
-        let scale = self.surface.scale();
-        let side = self.side(p, class, found, || self.surface.tree().facet(found.triangle).nearest(p * scale));
+            CellClass::Surface | CellClass::Undecided => {
+                surface.side(p * scale, &surface.tree().facet(found.triangle).nearest(p * scale), found.triangle)
+            }
+        };
         (found.distance_squared.sqrt() / scale, side)
     }
 
-    /// Signed distances, negative inside. A fraction of a microsecond a point where lists are short.
-    pub fn distances(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<f64>> {
-        each_along(points, run, |p| {
-            let (distance, side) = self.distance_and_side(p);
-            side.sign() * distance
-        })
-    }
-
-    /// The intervals that contain the true signed distances.
-    pub fn bounds(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Interval>> {
-        each_along(points, run, |p| self.at(p))
-    }
-
-    /// The nearest points of the surface.
-    pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Nearest>> {
-        each_along(points, run, |p| self.surface.describe(p * self.surface.scale(), self.search(p).0))
+    /// The interval of [`CompleteField::sided`].
+    pub(super) fn interval(&self, p: DVec3, found: Candidate, class: CellClass) -> Interval {
+        let (distance, side) = self.sided(p, found, class);
+        if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
     }
 
     /// Counts and sizes.
@@ -345,8 +328,8 @@ impl Distance for CompleteField {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        let (distance, side) = self.distance_and_side(p);
-        if side.is_certain() { Interval::exact(side.sign() * distance) } else { Interval::either_side(distance) }
+        let (found, class) = self.search(p);
+        self.interval(p, found, class)
     }
 
     fn over(&self, cell: &Aabb) -> Interval {

@@ -1,6 +1,5 @@
 //! Many points at once.
 
-use crate::bvh::order::along_curve;
 use crate::error::Result;
 use crate::geom::DVec3;
 use crate::run::Run;
@@ -16,10 +15,4 @@ pub(super) fn each<T: Send>(points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVe
         Ok(points[block * CHUNK..((block + 1) * CHUNK).min(points.len())].iter().map(|&p| answer(p)).collect::<Vec<_>>())
     })?;
     Ok(blocks.into_iter().flatten().collect())
-}
-
-/// As [`each`], where neighbours in space need the same memory: the points are visited along a space-filling curve.
-pub(super) fn each_along<T: Copy + Send + Sync>(points: &[DVec3], run: &Run<'_>, answer: impl Fn(DVec3) -> T + Sync) -> Result<Vec<T>> {
-    check_points(points)?;
-    along_curve("query the field", points, run, |points, _| points.iter().map(|&p| answer(p)).collect())
 }

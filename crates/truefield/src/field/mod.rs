@@ -2,6 +2,7 @@
 
 pub mod adaptive;
 pub mod complete;
+mod complete_many;
 mod each;
 pub mod parts;
 pub mod sampled;
