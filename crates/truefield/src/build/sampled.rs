@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::field::{Continuity, Known, SampledField};
 use crate::grid::Grid;
 use crate::run::Run;
+use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
 /// Edge of the blocks that are answered at once.
@@ -114,15 +115,34 @@ impl<'a> Sampler<'a> {
     }
 
     fn store(&mut self, block: &Block, sides: &[Side; BLOCK]) {
-        let (scale, limit) = (self.surface.scale(), (self.band / self.surface.scale()) as f32);
-        for (i, local) in slots(block) {
-            let value = (self.answers.squared[i].sqrt() / scale) as f32;
-            *self.values.at([0, 1, 2].map(|axis| block.low[axis] + local[axis])) = sides[i].sign() as f32 * value.min(limit);
-            if !sides[i].is_certain() {
-                let global: [u64; 3] = std::array::from_fn(|axis| (block.low[axis] + local[axis] - self.lattice.first[axis]) as u64);
-                let [_, ny, nz] = self.lattice.shape.map(u64::from);
-                self.doubtful.push((global[0] * ny + global[1]) * nz + global[2]);
-            }
+        // A power of two: as exact as dividing.
+        let inverse = 1.0 / self.surface.scale();
+        let mut values = [0.0; BLOCK];
+        lengths(&self.answers, inverse, (self.band * inverse) as f32, &mut values);
+        for (value, side) in values.iter_mut().zip(sides) {
+            *value *= side.sign() as f32;
         }
+        self.values.copy(block, &values, EDGE as usize);
+        if sides.iter().all(|side| side.is_certain()) {
+            return;
+        }
+        for (_, local) in slots(block).filter(|&(i, _)| !sides[i].is_certain()) {
+            let global: [u64; 3] = std::array::from_fn(|axis| (block.low[axis] + local[axis] - self.lattice.first[axis]) as u64);
+            let [_, ny, nz] = self.lattice.shape.map(u64::from);
+            self.doubtful.push((global[0] * ny + global[1]) * nz + global[2]);
+        }
+    }
+}
+
+multiversion!(
+    /// Distances times `scale`, at most `limit`.
+    fn lengths(answers: &Answers, scale: f64, limit: f32, out: &mut [f32; BLOCK]) = lengths_body
+);
+
+#[inline(always)]
+fn lengths_body<F: Fuse>(answers: &Answers, scale: f64, limit: f32, out: &mut [f32; BLOCK]) {
+    for (out, squared) in out.iter_mut().zip(&answers.squared) {
+        let value = (squared.sqrt() * scale) as f32;
+        *out = if value < limit { value } else { limit };
     }
 }

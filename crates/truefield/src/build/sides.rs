@@ -67,19 +67,22 @@ impl<'a> Sides<'a> {
         let longest = 10.0 * spacing;
         let mut sides = [Side::Outside; BLOCK];
         while left != 0 {
-            let i = farthest(&answers.squared, left);
+            let i = farthest(answers, left);
             let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
             let triangle = answers.triangle[i];
             let (side, carry) = self.surface.steady(p, &tree.facet(triangle).nearest(p), triangle, longest);
             let reached = if side.is_certain() { clear.reach(1 << i, left, carry / steps[2]) } else { 1 << i };
             left &= !reached;
-            for i in bits(reached) {
-                sides[i] = side;
+            for (i, out) in sides.iter_mut().enumerate() {
+                *out = if reached >> i & 1 == 1 { side } else { *out };
             }
         }
         sides
     }
 }
+
+/// Points that are looked at side by side.
+const LANES: usize = 16;
 
 /// The way to a neighbour: how far on it is, along how many axes, and the slots that have one there.
 type Way = (u32, usize, u64);
@@ -143,7 +146,6 @@ multiversion!(
 
 #[inline(always)]
 fn clear_ways_body<F: Fuse>(answers: &Answers, steps: &[f64; 3], clear: &mut Clear) {
-    const LANES: usize = 16;
     // Single precision, shorter than the truth by more than all its rounding; slots beyond the block lead nowhere.
     let mut distance = [0.0f32; BLOCK + 32];
     for (distance, squared) in distance.iter_mut().zip(&answers.squared) {
@@ -163,18 +165,22 @@ fn clear_ways_body<F: Fuse>(answers: &Answers, steps: &[f64; 3], clear: &mut Cle
     }
 }
 
-/// The one of `among` with the greatest distance, the lowest of those.
-fn farthest(squared: &[f64; BLOCK], among: u64) -> usize {
-    bits(among).fold((0, -1.0), |best, i| if squared[i] > best.1 { (i, squared[i]) } else { best }).0
-}
+multiversion!(
+    /// The one of `among` with the greatest distance, the lowest of those.
+    fn farthest(answers: &Answers, among: u64) -> usize = farthest_body
+);
 
-/// The places of the ones, ascending.
-fn bits(mut ones: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let at = ones.trailing_zeros() as usize;
-        ones &= ones.wrapping_sub(1);
-        (at < BLOCK).then_some(at)
-    })
+#[inline(always)]
+fn farthest_body<F: Fuse>(answers: &Answers, among: u64) -> usize {
+    let mut greatest = [-1.0f64; LANES];
+    for start in (0..BLOCK).step_by(LANES) {
+        for lane in 0..LANES {
+            let squared = answers.squared[start + lane];
+            greatest[lane] = if (among >> (start + lane) & 1 == 1) & (squared > greatest[lane]) { squared } else { greatest[lane] };
+        }
+    }
+    let greatest = greatest.into_iter().fold(-1.0, f64::max);
+    (0..BLOCK).find(|&i| among >> i & 1 == 1 && answers.squared[i] == greatest).unwrap_or(0)
 }
 
 /// The nearest triangle of a point, from the complete list of a box around it where that is short.

@@ -27,6 +27,17 @@ impl<T: Copy> Tile<T> {
         &mut self.values[at]
     }
 
+    /// Takes the values of a part from a block of so many a row and rows a layer.
+    pub fn copy(&mut self, part: &Block, from: &[T], edge: usize) {
+        let length = (part.high[2] - part.low[2]) as usize;
+        for (x, i) in (part.low[0]..part.high[0]).enumerate() {
+            for (y, j) in (part.low[1]..part.high[1]).enumerate() {
+                let (start, row) = (self.number([i, j, part.low[2]]), (x * edge + y) * edge);
+                self.values[start..start + length].copy_from_slice(&from[row..row + length]);
+            }
+        }
+    }
+
     /// Gives a part of the tile one value.
     pub fn fill(&mut self, part: &Block, value: T) {
         for i in part.low[0]..part.high[0] {

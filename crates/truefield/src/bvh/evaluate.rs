@@ -41,9 +41,10 @@ impl Points {
     pub fn of_block(lattice: &Grid, block: &Block) -> Self {
         let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
         let at = |axis: usize, step: usize| (block.low[axis] + step as i64).min(block.high[axis] - 1);
+        // Each coordinate depends on one index.
+        let steps: [DVec3; 4] = std::array::from_fn(|step| lattice.corner(at(0, step), at(1, step), at(2, step)));
         for i in 0..BLOCK {
-            let p = lattice.corner(at(0, i >> 4), at(1, i >> 2 & 3), at(2, i & 3));
-            (points.x[i], points.y[i], points.z[i]) = (p.x, p.y, p.z);
+            (points.x[i], points.y[i], points.z[i]) = (steps[i >> 4].x, steps[i >> 2 & 3].y, steps[i & 3].z);
         }
         points
     }
