@@ -137,7 +137,7 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
 
 /// Offers a triangle to the chosen points; the lowest index keeps ties.
 #[inline(always)]
-fn exact(tree: &Tree, points: &Points, slot: Slot, chosen: &[u8], out: &mut Answers) {
+pub(super) fn exact(tree: &Tree, points: &Points, slot: Slot, chosen: &[u8], out: &mut Answers) {
     let (facet, triangle) = (*tree.facet_at(slot), tree.triangle(slot));
     for group in chosen.chunks(GROUP) {
         let mut p = [[0.0f64; GROUP]; 3];

@@ -9,6 +9,7 @@ pub(crate) mod evaluate;
 mod frame;
 pub(crate) mod intersect;
 mod nearest;
+pub(crate) mod octants;
 pub(crate) mod order;
 pub(crate) mod pairs;
 mod ray;

@@ -57,7 +57,7 @@ pub(super) struct At<'a> {
     pub range: Range,
     /// The side of all its points, where that is known.
     pub side: Option<Side>,
-    pub corners: [Corner; 8],
+    pub corners: &'a [Corner; 8],
     /// A point of the surface near its centre, where one is known.
     pub center: Option<DVec3>,
     /// What is said at the corners, and between them by interpolation: by the cell itself or by one that it is a part of.
@@ -115,7 +115,7 @@ impl<'a> Prover<'a> {
     /// Contains the distance minus the interpolation of what is told, without a look at the list; from above no sharper
     /// than `limit`.
     pub fn coarse(&self, at: &At<'_>, limit: f64) -> Interval {
-        let corners = &at.corners;
+        let corners = at.corners;
         let told = at.told;
         let (low, high) = ends(&told);
         let [lower, upper] = [at.range.lower, at.range.upper];
@@ -212,7 +212,7 @@ impl<'a> Prover<'a> {
         if !(cosine > STEEPEST) {
             return None;
         }
-        let found = between_planes(self.planes, at.list, &at.corners, &at.told, 1.0 / cosine);
+        let found = between_planes(self.planes, at.list, at.corners, &at.told, 1.0 / cosine);
         let turn = (1.0 - cosine * cosine).sqrt();
         let differences = hull(std::array::from_fn(|j| at.corners[j].value - at.told[j]));
         Some((found.intersection(self.by_samples(at, differences, at.cell.size().x, turn)), turn))

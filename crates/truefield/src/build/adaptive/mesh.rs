@@ -8,10 +8,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::facets::{At, Corner, Plane, Prover};
 use super::halves::{CENTER, Halves, INNER, blend, of_part, steps};
 use super::{Rule, Rules};
-use crate::build::sides::nearest;
 use crate::bvh::Candidate;
-use crate::bvh::cover::{OCTANTS, Range, Scratch, gather_few, refine};
+use crate::bvh::cover::{OCTANTS, Range, Scratch, gather_few};
 use crate::bvh::descend::Block;
+use crate::bvh::octants::{NODES, Octants};
 use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
 use crate::field::Continuity;
@@ -33,15 +33,15 @@ const LIST: usize = 12;
 /// Longer lists are not kept: the tree is quicker.
 const LONGEST: usize = 64;
 
-/// Triangles are listed where there are no more than this.
+/// Triangles of a cell that is not divided are listed where there are no more than this.
 const LISTED: usize = 128;
+
+/// Those of a cell that may be divided; its corners' nearest points shorten the list.
+const MOST: usize = 512;
 
 /// Exact leaves this many times their half diagonal away are not divided for the sake of their lists, which are as long in
 /// the parts.
 const FAR: f64 = 3.0;
-
-/// Points are looked for in lists up to this length, and in the tree where they are longer.
-const SEARCHED: usize = 32;
 
 /// What no number is in.
 const NOTHING: Interval = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
@@ -92,8 +92,7 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let blocks = Block::tiles(&lattice, edge);
     let parts = run.blocks("build the tree", blocks.len(), |number| {
         let mut builder = Builder::new(&job);
-        let start = builder.start(blocks[number].low, edge);
-        builder.divide(start, None, run)?;
+        builder.tile(blocks[number].low, edge, run)?;
         Ok(builder.cells)
     })?;
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
@@ -135,12 +134,12 @@ struct Node {
 }
 
 /// A cell to be judged, and what its parent knew.
+#[derive(Clone, Copy)]
 struct Start {
     /// Lattice indices of its lowest corner.
     low: [i64; 3],
     /// In lattice cells.
     edge: i64,
-    corners: [Corner; 8],
     /// The side of all its points, where that is known.
     side: Option<Side>,
     /// Of unsigned distances in it.
@@ -162,13 +161,15 @@ impl Start {
     }
 
     /// One of eight parts, of which all that is known holds.
-    fn part(&self, octant: usize, corners: [Corner; 8]) -> Self {
+    fn part(&self, octant: usize) -> Self {
         let half = self.edge / 2;
-        Self { low: place(self.low, half, octant), edge: half, corners, ..*self }
+        Self { low: place(self.low, half, octant), edge: half, ..*self }
     }
 
-    fn parts(&self, lattice: &Grid) -> [Aabb; OCTANTS] {
-        std::array::from_fn(|octant| self.part(octant, self.corners).cell(lattice))
+    /// Lattice indices of a corner of its parts.
+    fn node(&self, number: usize) -> [i64; 3] {
+        let steps = steps(number);
+        [0, 1, 2].map(|axis| self.low[axis] + steps[axis] * (self.edge / 2))
     }
 
     /// With what else is known of its range.
@@ -177,81 +178,215 @@ impl Start {
     }
 }
 
-/// What is proven of a cell that has been looked at more closely.
+/// A cell, what it says and what is proven of it.
+struct Seen<'a> {
+    start: Start,
+    cell: Aabb,
+    corners: &'a [Corner; 8],
+    values: [f32; 8],
+    /// The values in the tree's units.
+    told: [f64; 8],
+    /// The largest error that is allowed.
+    limit: f64,
+    /// Contains the distance minus what is told.
+    known: Interval,
+}
+
+impl Seen<'_> {
+    fn at<'b>(&'b self, center: Option<DVec3>, list: &'b [Slot]) -> At<'b> {
+        let Start { range, side, .. } = self.start;
+        At { cell: self.cell, range, side, corners: self.corners, center, told: self.told, list }
+    }
+
+    /// Whether no more is asked of it.
+    fn is_within(&self) -> bool {
+        within(self.known, self.limit)
+    }
+}
+
+fn within(error: Interval, limit: f64) -> bool {
+    error.upper <= limit && error.lower >= -limit
+}
+
+/// What is proven of the parts of a cell, as far as the first that fails.
 struct Proof {
     /// Contains the distance minus what is told.
     known: Interval,
-    /// Of each part, as far as the first that fails.
     parts: [Option<Interval>; OCTANTS],
-}
-
-/// What a list proves of a cell, and the lists and ranges of its parts where they were needed.
-struct Listed {
-    known: Interval,
-    parts: Option<([Vec<Slot>; OCTANTS], [Range; OCTANTS])>,
 }
 
 /// The cells of one tile.
 struct Builder<'a> {
     job: &'a Job<'a>,
     prover: Prover<'a>,
+    /// Corners that were searched for in the tree, or whose sides are dear.
     corners: HashMap<u64, Corner, BuildHasherDefault<Mix>>,
     cells: Vec<Node>,
     scratch: Scratch,
+    octants: Octants,
     /// Lists that no cell uses at present.
     lists: Vec<[Vec<Slot>; OCTANTS]>,
+    owned: Vec<Vec<Slot>>,
 }
 
 impl<'a> Builder<'a> {
     fn new(job: &'a Job<'a>) -> Self {
-        let prover = Prover::new(job.surface, job.planes);
-        Self { job, prover, corners: HashMap::default(), cells: Vec::new(), scratch: Scratch::default(), lists: Vec::new() }
+        Self {
+            job,
+            prover: Prover::new(job.surface, job.planes),
+            corners: HashMap::default(),
+            cells: Vec::new(),
+            scratch: Scratch::default(),
+            octants: Octants::default(),
+            lists: Vec::new(),
+            owned: Vec::new(),
+        }
     }
 
-    /// The cell of a tile.
-    fn start(&mut self, low: [i64; 3], edge: i64) -> Start {
-        let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], &[], None));
-        Start { low, edge, corners, side: None, range: Range::ALL }
+    /// Builds a tile.
+    fn tile(&mut self, low: [i64; 3], edge: i64, run: &Run<'_>) -> Result<()> {
+        let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], None));
+        self.divide(Start { low, edge, side: None, range: Range::ALL }, &corners, &[], run)
     }
 
     /// Looks at a cell: its range and its side.
-    fn look(&self, start: Start) -> (Start, Aabb) {
-        let (cell, mut start) = self.part(start);
+    fn look(&self, start: Start, corners: &[Corner; 8]) -> (Start, Aabb) {
+        let (cell, mut start) = self.part(start, corners);
         let surface = self.job.surface;
         if start.side.is_none() && start.range.lower > 0.0 && !surface.side_changes_at_surface_only() {
-            let center = corner(surface, cell.center(), &[], &start.corners, None);
+            let center = corner(surface, cell.center(), corners, None);
             start.side = side_of_ball(surface, &center, cell.radius() * (1.0 + 1e-12));
         }
         (start, cell)
     }
 
-    /// Asks for the corners of the parts of a cell; stops, with false, at one whose side is certain that is farther than
-    /// `limit` from what is told.
-    fn sample(&mut self, start: &Start, halves: &mut Halves, told: &[f64; 27], list: &[Slot], limit: f64) -> bool {
-        for number in INNER {
-            let found = match halves.0[number] {
-                Some(found) => found,
-                None => {
-                    let [x, y, z] = steps(number).map(|step| step * (start.edge / 2));
-                    let found = self.corner([start.low[0] + x, start.low[1] + y, start.low[2] + z], list, &start.corners, start.side);
-                    *halves.0[number].insert(found)
-                }
-            };
-            if found.certain && (found.value - told[number]).abs() > limit {
-                return false;
+    /// A part of a cell, and what follows from its corners.
+    fn part(&self, start: Start, corners: &[Corner; 8]) -> (Aabb, Start) {
+        let cell = start.cell(self.job.lattice);
+        let mut start = start.within(self.prover.range(&cell, corners));
+        if start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only() {
+            start.side = one_side(corners);
+        }
+        (cell, start)
+    }
+
+    /// The largest error of a cell, in the tree's units.
+    fn allowed(&self, start: &Start) -> f64 {
+        let scale = self.job.surface.scale();
+        self.job.rules.allowed(start.range.lower / scale) * scale
+    }
+
+    /// Judges a cell and, where it is a branch, its parts. `list` is complete, or empty where there is none.
+    fn divide(&mut self, start: Start, corners: &[Corner; 8], list: &[Slot], run: &Run<'_>) -> Result<()> {
+        let scale = self.job.surface.scale();
+        let (start, cell) = self.look(start, corners);
+        let values = corners.map(|corner| (corner.value / scale) as f32);
+        let told = values.map(|v| f64::from(v) * scale);
+        let limit = self.allowed(&start);
+        let mut seen = Seen { start, cell, corners, values, told, limit, known: Interval::ALL };
+        seen.known = self.prover.coarse(&seen.at(None, &[]), limit);
+        let proven = self.job.leaves == Leaves::Linear && seen.is_within();
+        if start.edge > 1 && !proven {
+            return self.look_inside(seen, list, run);
+        }
+        let mut own = self.owned.pop().unwrap_or_default();
+        let mut list = list;
+        if list.is_empty() && !proven && gather_few(self.job.surface.tree(), &cell, witness(corners), LISTED, &mut self.scratch, &mut own) {
+            list = &own;
+        }
+        if !proven && !list.is_empty() && self.job.leaves == Leaves::Linear {
+            seen.known = self.prover.fine(&seen.at(None, list), seen.known, limit).0;
+        }
+        let done = self.push_leaf(&seen, list, run);
+        self.owned.push(own);
+        done
+    }
+
+    /// Judges a cell by the corners of its parts, and divides it where that is not enough.
+    fn look_inside(&mut self, mut seen: Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
+        let mut own = self.owned.pop().unwrap_or_default();
+        let few = list.is_empty() && gather_few(self.job.surface.tree(), &seen.cell, witness(seen.corners), MOST, &mut self.scratch, &mut own);
+        let mut halves = Halves::new(seen.corners);
+        if few {
+            self.measure(&seen.start, &seen.cell, &own);
+            self.octants.shorten(&seen.corners.map(|corner| corner.foot), &mut own);
+            self.answer(&seen.start, &mut halves, &own);
+        } else if !list.is_empty() {
+            self.measure(&seen.start, &seen.cell, list);
+            self.answer(&seen.start, &mut halves, list);
+        } else {
+            // The centre tells the range.
+            self.ask(&seen.start, &mut halves, CENTER);
+        }
+        let list = if few { own.as_slice() } else { list };
+        let center = halves.corner(CENTER);
+        let (far, radius) = (center.value.abs(), seen.cell.radius() * (1.0 + 1e-12));
+        seen.start = self.look(seen.start.within(Range { lower: far - radius, upper: far + radius }), seen.corners).0;
+        seen.limit = self.allowed(&seen.start);
+        let (leaf, lists) = match self.job.leaves {
+            Leaves::Exact => (seen.start.range.lower >= FAR * seen.cell.radius() || (1..=LIST).contains(&list.len()), None),
+            Leaves::Linear => self.prove(&mut seen, &mut halves, list),
+        };
+        let done = if leaf { self.push_leaf(&seen, list, run) } else { self.branch(&seen, &mut halves, list, lists, run) };
+        self.owned.push(own);
+        done
+    }
+
+    /// Whether a cell with linear leaves need not be divided; and the lists of its parts, where they were needed to know.
+    fn prove(&mut self, seen: &mut Seen<'_>, halves: &mut Halves, list: &[Slot]) -> (bool, Option<[Vec<Slot>; OCTANTS]>) {
+        let blended = blend(&seen.told);
+        // A sample that is too far off ends the hope.
+        if !self.is_close(&seen.start, halves, &blended, seen.limit) {
+            return (false, None);
+        }
+        let samples = self.job.rules.rule == Rule::Samples;
+        let proof = self.prove_parts(&seen.start, halves, &blended, seen.limit);
+        seen.known = seen.known.intersection(proof.known);
+        if seen.is_within() || list.is_empty() {
+            return (samples || seen.is_within(), None);
+        }
+        let at = seen.at(Some(halves.corner(CENTER).foot), list);
+        let (known, turn) = self.prover.fine(&at, seen.known, seen.limit);
+        let mut known = known;
+        if turn < 1.0 && !within(known, seen.limit) {
+            let differences = (0..NODES).map(|number| Interval::exact(halves.corner(number).value - blended[number]));
+            let differences = differences.fold(NOTHING, Interval::hull);
+            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * seen.cell.size().x, turn));
+        }
+        seen.known = known;
+        if seen.is_within() {
+            return (true, None);
+        }
+        let mut lists = self.lists.pop().unwrap_or_default();
+        self.octants.split(&halves.feet(), list, &mut lists);
+        let mut whole = NOTHING;
+        for octant in 0..OCTANTS {
+            let corners = halves.corners(octant);
+            let (cell, part) = self.part(seen.start.part(octant), &corners);
+            let told = of_part(&blended, octant);
+            let at = At { cell, range: part.range, side: part.side, corners: &corners, center: None, told, list: &lists[octant] };
+            let mut known = proof.parts[octant].unwrap_or_else(|| self.prover.coarse(&at, seen.limit));
+            if !within(known, seen.limit) {
+                known = self.prover.fine(&at, known, seen.limit).0;
+            }
+            whole = whole.hull(known);
+            if self.fails(known, seen.limit) {
+                whole = Interval::ALL;
+                break;
             }
         }
-        true
+        seen.known = seen.known.intersection(whole);
+        (samples || seen.is_within(), Some(lists))
     }
 
     /// Proves the parts of a cell one by one by their corners. Where one fails a cell will be divided, or its list is looked
     /// at, unless samples are enough.
-    fn prove_parts(&self, start: &Start, halves: &Halves, told: &[f64; 27], limit: f64) -> Proof {
+    fn prove_parts(&self, start: &Start, halves: &Halves, told: &[f64; NODES], limit: f64) -> Proof {
         let mut proof = Proof { known: NOTHING, parts: [None; OCTANTS] };
         for octant in 0..OCTANTS {
-            let Some(corners) = halves.corners(octant) else { continue };
-            let (cell, start) = self.part(start.part(octant, corners));
-            let at = At { cell, range: start.range, side: start.side, corners, center: None, told: of_part(told, octant), list: &[] };
+            let corners = halves.corners(octant);
+            let (cell, start) = self.part(start.part(octant), &corners);
+            let at = At { cell, range: start.range, side: start.side, corners: &corners, center: None, told: of_part(told, octant), list: &[] };
             let part = self.prover.coarse(&at, limit);
             proof.parts[octant] = Some(part);
             proof.known = proof.known.hull(part);
@@ -265,160 +400,106 @@ impl<'a> Builder<'a> {
 
     /// Whether a part that is not proven any better decides that the cell is divided.
     fn fails(&self, part: Interval, limit: f64) -> bool {
-        self.job.rules.rule == Rule::Verified && (part.upper > limit || part.lower < -limit)
+        self.job.rules.rule == Rule::Verified && !within(part, limit)
     }
 
-    /// Sharpens what is proven of a cell by its complete list, until it is within `limit`; `parts` are its parts and what is
-    /// proven of them.
-    fn prove_by_list(
+    /// Stores a leaf.
+    fn push_leaf(&mut self, seen: &Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
+        let tree = self.job.surface.tree();
+        let (kind, kept) = match self.job.leaves {
+            Leaves::Linear => (LevelKind::Linear, Box::default()),
+            Leaves::Exact if list.len() <= LONGEST => (LevelKind::Exact, list.iter().map(|&slot| tree.triangle(slot)).collect()),
+            Leaves::Exact => (LevelKind::Exact, Box::default()),
+        };
+        self.push(seen, kind, kept, run)
+    }
+
+    /// Stores a cell and divides it.
+    fn branch(
         &mut self,
-        start: &Start,
-        at: At<'_>,
-        parts: Option<(&Halves, &[f64; 27], Proof)>,
-        known: Interval,
-        limit: f64,
-    ) -> Listed {
-        let within = |error: Interval| error.upper <= limit && error.lower >= -limit;
-        let (mut known, turn) = self.prover.fine(&at, known, limit);
-        let Some((halves, told, proof)) = parts else { return Listed { known, parts: None } };
-        if turn < 1.0 && !within(known) {
-            let differences = halves.0.iter().zip(told).filter_map(|(found, told)| Some(Interval::exact((*found)?.value - told)));
-            let differences = differences.fold(NOTHING, Interval::hull);
-            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * at.cell.size().x, turn));
-        }
-        if within(known) {
-            return Listed { known, parts: None };
-        }
-        let mut lists = self.lists.pop().unwrap_or_default();
-        let ranges = refine(self.job.surface.tree(), &start.parts(self.job.lattice), at.list, &mut self.scratch, &mut lists);
-        let mut whole = NOTHING;
+        seen: &Seen<'_>,
+        halves: &mut Halves,
+        list: &[Slot],
+        lists: Option<[Vec<Slot>; OCTANTS]>,
+        run: &Run<'_>,
+    ) -> Result<()> {
+        self.push(seen, LevelKind::Branch, Box::default(), run)?;
+        (0..NODES).for_each(|number| self.ask(&seen.start, halves, number));
+        let lists = lists.unwrap_or_else(|| {
+            let mut lists = self.lists.pop().unwrap_or_default();
+            lists.iter_mut().for_each(Vec::clear);
+            if !list.is_empty() {
+                self.octants.split(&halves.feet(), list, &mut lists);
+            }
+            lists
+        });
         for octant in 0..OCTANTS {
-            let Some(corners) = halves.corners(octant) else { continue };
-            let (cell, start) = self.part(start.part(octant, corners).within(ranges[octant]));
-            let told = of_part(told, octant);
-            let at = At { cell, range: start.range, side: start.side, corners, center: None, told, list: &lists[octant] };
-            let mut part = proof.parts[octant].unwrap_or_else(|| self.prover.coarse(&at, limit));
-            if !within(part) {
-                part = self.prover.fine(&at, part, limit).0;
-            }
-            whole = whole.hull(part);
-            if self.fails(part, limit) {
-                whole = Interval::ALL;
-                break;
-            }
+            self.divide(seen.start.part(octant), &halves.corners(octant), &lists[octant], run)?;
         }
-        Listed { known: known.intersection(whole), parts: Some((lists, ranges)) }
+        self.lists.push(lists);
+        Ok(())
     }
 
-    /// A part of a cell, and what follows from its corners.
-    fn part(&self, start: Start) -> (Aabb, Start) {
-        let cell = start.cell(self.job.lattice);
-        let range = self.prover.range(&cell, &start.corners);
-        let mut start = start.within(range);
-        if start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only() {
-            start.side = one_side(&start.corners);
-        }
-        (cell, start)
-    }
-
-    /// Judges a cell and, where it is a branch, its parts. `list` is complete, where there is one.
-    fn divide(&mut self, start: Start, list: Option<&[Slot]>, run: &Run<'_>) -> Result<()> {
-        let Job { surface, lattice, depth, rules, leaves, .. } = *self.job;
-        let (scale, tree) = (surface.scale(), surface.tree());
-        let (mut start, cell) = self.look(start);
-        let Start { low, edge, corners, .. } = start;
-        let values = corners.map(|corner| (corner.value / scale) as f32);
-        let told = values.map(|v| f64::from(v) * scale);
-        let blended = blend(&told);
-        let allowed = |range: Range| rules.allowed(range.lower / scale) * scale;
-        let at = |start: &Start, center, list| At { cell, range: start.range, side: start.side, corners, center, told, list };
-        let mut limit = allowed(start.range);
-        let within = |error: Interval, limit: f64| error.upper <= limit && error.lower >= -limit;
-        let mut known = self.prover.coarse(&at(&start, None, &[]), limit);
-        let mut halves = Halves::new(&corners);
-        let linear = leaves == Leaves::Linear;
-        // A sample that is too far off ends the hope.
-        let (mut close, mut proof) = (true, None);
-        if edge > 1 && !(linear && within(known, limit)) {
-            // The centre, which is a corner of the parts, tells the range.
-            let center = self.corner(place(low, edge / 2, 7), list.unwrap_or(&[]), &corners, start.side);
-            halves.0[CENTER] = Some(center);
-            let (far, radius) = (center.value.abs(), cell.radius() * (1.0 + 1e-12));
-            start = self.look(start.within(Range { lower: far - radius, upper: far + radius })).0;
-            limit = allowed(start.range);
-            close = !linear || self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), limit);
-            if linear && close {
-                let found = self.prove_parts(&start, &halves, &blended, limit);
-                known = known.intersection(found.known);
-                proof = Some(found);
-            }
-        }
-        let range = start.range;
-        let center = halves.0[CENTER].map(|center| center.foot);
-        let done = linear && (within(known, limit) || !close);
-        // Triangles are looked at where they can still tell something.
-        let mut own = Vec::new();
-        let witness = center.unwrap_or(corners[0].foot);
-        let listed = list.is_some() || !done && gather_few(tree, &cell, witness, LISTED, &mut self.scratch, &mut own);
-        let list = list.or_else(|| listed.then_some(own.as_slice()));
-        let mut parts = None;
-        if !done
-            && linear
-            && let Some(list) = list
-        {
-            let found = self.prove_by_list(&start, at(&start, center, list), proof.map(|proof| (&halves, &blended, proof)), known, limit);
-            (known, parts) = (found.known, found.parts);
-        }
-        let leaf = match (leaves, list) {
-            _ if edge == 1 => true,
-            (Leaves::Exact, list) => range.lower >= FAR * cell.radius() || list.is_some_and(|list| list.len() <= LIST),
-            (Leaves::Linear, _) => within(known, limit) || close && rules.rule == Rule::Samples,
-        };
-        let kind = match (leaf, leaves) {
-            (false, _) => LevelKind::Branch,
-            (true, Leaves::Linear) => LevelKind::Linear,
-            (true, Leaves::Exact) => LevelKind::Exact,
-        };
-        let kept = match (kind, list) {
-            (LevelKind::Exact, Some(list)) if list.len() <= LONGEST => list.iter().map(|&slot| tree.triangle(slot)).collect(),
-            _ => Box::default(),
-        };
-        let record = Record::new(values, Interval { lower: known.lower / scale, upper: known.upper / scale });
+    fn push(&mut self, seen: &Seen<'_>, kind: LevelKind, list: Box<[u32]>, run: &Run<'_>) -> Result<()> {
+        let Job { surface, depth, rules, .. } = *self.job;
+        let Start { low, edge, side, .. } = seen.start;
+        let scale = surface.scale();
+        let record = Record::new(seen.values, Interval { lower: seen.known.lower / scale, upper: seen.known.upper / scale });
         let level = depth - edge.trailing_zeros();
         let place = along_curve(low.map(|low| (low / edge) as u32));
-        self.cells.push(Node { depth: level, place, kind, record, list: (list_side(start.side), kept) });
+        self.cells.push(Node { depth: level, place, kind, record, list: (list_side(side), list) });
         if self.cells.len().is_multiple_of(COUNTED) {
             run.cancel.check()?;
             let cells = self.job.cells.fetch_add(COUNTED as u64, Ordering::Relaxed) + COUNTED as u64;
             rules.fits(level, cells, cells, f64::from(record.upper.max(-record.lower)))?;
         }
-        if leaf {
-            self.lists.extend(parts.map(|(lists, _)| lists));
-            return Ok(());
-        }
-        self.sample(&start, &mut halves, &blended, list.unwrap_or(&[]), f64::INFINITY);
-        if let (Some(list), None) = (list, &parts) {
-            let mut lists = self.lists.pop().unwrap_or_default();
-            let ranges = refine(tree, &start.parts(lattice), list, &mut self.scratch, &mut lists);
-            parts = Some((lists, ranges));
-        }
-        for octant in 0..OCTANTS {
-            let Some(corners) = halves.corners(octant) else { continue };
-            let part = start.part(octant, corners);
-            match &parts {
-                Some((lists, ranges)) => self.divide(part.within(ranges[octant]), Some(&lists[octant]), run)?,
-                None => self.divide(part, None, run)?,
-            }
-        }
-        self.lists.extend(parts.map(|(lists, _)| lists));
         Ok(())
     }
 
+    /// Asks for the corners of the parts of a cell; stops, with false, at one whose side is certain that is farther than
+    /// `limit` from what is told.
+    fn is_close(&mut self, start: &Start, halves: &mut Halves, told: &[f64; NODES], limit: f64) -> bool {
+        INNER.iter().all(|&number| {
+            self.ask(start, halves, number);
+            let found = halves.corner(number);
+            !found.certain || (found.value - told[number]).abs() <= limit
+        })
+    }
+
+    /// Takes up a cell and its complete list.
+    fn measure(&mut self, start: &Start, cell: &Aabb, list: &[Slot]) {
+        let nodes = std::array::from_fn(|number| {
+            let [x, y, z] = start.node(number);
+            self.job.lattice.corner(x, y, z)
+        });
+        self.octants.measure(self.job.surface.tree(), cell, &nodes, list);
+    }
+
+    /// Fills in the corners of the parts of the cell that was taken up, from its complete list.
+    fn answer(&mut self, start: &Start, halves: &mut Halves, list: &[Slot]) {
+        let Job { surface, lattice, .. } = *self.job;
+        let answers = self.octants.nearest(surface.tree(), list);
+        let asked_once = start.side.is_none() && !surface.side_changes_at_surface_only();
+        for number in INNER {
+            let place = start.node(number);
+            let found = || found(surface, lattice.corner(place[0], place[1], place[2]), answers[number], start.side);
+            halves.set(number, if asked_once { *self.corners.entry(key(place)).or_insert_with(found) } else { found() });
+        }
+    }
+
+    /// Fills in one corner of the parts of a cell, where it is not known, by the tree.
+    fn ask(&mut self, start: &Start, halves: &mut Halves, number: usize) {
+        if !halves.knows(number) {
+            let found = self.corner(start.node(number), halves.all(), start.side);
+            halves.set(number, found);
+        }
+    }
+
     /// A lattice point of a cell, in the tree's units; `near` may be near it.
-    fn corner(&mut self, place: [i64; 3], list: &[Slot], near: &[Corner], side: Option<Side>) -> Corner {
-        let key = place.iter().fold(0, |key, &i| key << 21 | i as u64);
+    fn corner(&mut self, place: [i64; 3], near: &[Corner], side: Option<Side>) -> Corner {
         let job = self.job;
-        *self.corners.entry(key).or_insert_with(|| corner(job.surface, job.lattice.corner(place[0], place[1], place[2]), list, near, side))
+        let found = || corner(job.surface, job.lattice.corner(place[0], place[1], place[2]), near, side);
+        *self.corners.entry(key(place)).or_insert_with(found)
     }
 
     /// An inner cell above the tiles.
@@ -428,33 +509,46 @@ impl<'a> Builder<'a> {
         let values = std::array::from_fn(|octant| {
             let place = [0, 1, 2].map(|axis| (i64::from(index[axis]) + (octant >> axis & 1) as i64) * edge);
             let p = lattice.corner(place[0], place[1], place[2]);
-            (corner(surface, p, &[], &[], None).value / surface.scale()) as f32
+            (corner(surface, p, &[], None).value / surface.scale()) as f32
         });
         let record = Record::new(values, Interval::ALL);
         Node { depth, place: along_curve(index), kind: LevelKind::Branch, record, list: (ListSide::Asked, Box::default()) }
     }
 }
 
-/// The nearest point of the surface and the side of a point of a cell, in the tree's units. `near` are points that may be
-/// near it, and `list` is complete, or empty where there is none.
-fn corner(surface: &Surface, p: DVec3, list: &[Slot], near: &[Corner], side: Option<Side>) -> Corner {
+/// The nearest point of the surface and the side of a point, in the tree's units; `near` are points that may be near it.
+fn corner(surface: &Surface, p: DVec3, near: &[Corner], side: Option<Side>) -> Corner {
     let tree = surface.tree();
-    let found = if list.is_empty() || list.len() > SEARCHED {
-        let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
-        let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
-        tree.nearest(p, Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) })
-    } else {
-        nearest(tree, list, p)
-    };
-    let foot = tree.facet(found.triangle).nearest(p);
-    let side = side.unwrap_or_else(|| surface.side(p, &foot, found.triangle));
+    let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
+    let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
+    let start = Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) };
+    found(surface, p, tree.nearest(p, start), side)
+}
+
+/// The point whose nearest triangle was found.
+fn found(surface: &Surface, p: DVec3, nearest: Candidate, side: Option<Side>) -> Corner {
+    let tree = surface.tree();
+    let foot = tree.facet(nearest.triangle).nearest(p);
+    let side = side.unwrap_or_else(|| surface.side(p, &foot, nearest.triangle));
     Corner {
         value: side.sign() * foot.distance_squared.sqrt(),
         certain: side.is_certain(),
         point: p,
         foot: foot.point,
-        near: tree.slots[found.triangle as usize],
+        near: tree.slots[nearest.triangle as usize],
     }
+}
+
+/// A number for each lattice point.
+fn key(place: [i64; 3]) -> u64 {
+    place.iter().fold(0, |key, &i| key << 21 | i as u64)
+}
+
+/// The one of the corners' nearest points whose greatest distance from the cell is least.
+fn witness(corners: &[Corner; 8]) -> DVec3 {
+    let reach = |foot: DVec3| corners.iter().map(|corner| (corner.point - foot).length_squared()).fold(0.0, f64::max);
+    let nearer = |best: (f64, DVec3), foot| if reach(foot) < best.0 { (reach(foot), foot) } else { best };
+    corners.iter().map(|corner| corner.foot).fold((f64::INFINITY, corners[0].foot), nearer).1
 }
 
 /// The one side of a cell that the surface does not touch, where the side changes at the surface only.

@@ -1,0 +1,244 @@
+//! A cell and its octants in one pass over the cell's complete list: the nearest triangles of all their corners, and the
+//! complete lists of the octants.
+//!
+//! The 27 corners fill two vectors. Single-precision distances from them to every triangle of the list choose the few
+//! that are asked again in double precision; the same distances tell, as in [`super::cover`], which triangles a witness
+//! rules out for an octant. Witnesses are the exact nearest points of the octant's corners.
+
+use super::cover::{OCTANTS, filter_error};
+use super::evaluate::{Answers, Points, exact};
+use super::frame::Offsets;
+use super::nearest::Candidate;
+use super::tree::{Slot, Tree};
+use crate::geom::{Aabb, DVec3};
+use crate::simd::{Fuse, multiversion};
+
+/// Corners of the octants of a cell, x fastest.
+pub(crate) const NODES: usize = 27;
+
+/// Corners of a cell or of an octant.
+const CORNERS: usize = 8;
+
+const LANES: usize = 16;
+const PARTS: usize = 2;
+
+/// The node in each lane: the corners of the cell come first, so that they fill half a vector.
+const NODE: [u8; NODES] = [0, 2, 6, 8, 18, 20, 24, 26, 13, 4, 10, 12, 14, 16, 22, 1, 3, 5, 7, 9, 11, 15, 17, 19, 21, 23, 25];
+
+/// The lane of each node.
+const LANE: [u8; NODES] = {
+    let mut lanes = [0; NODES];
+    let mut lane = 0;
+    while lane < NODES {
+        lanes[NODE[lane] as usize] = lane as u8;
+        lane += 1;
+    }
+    lanes
+};
+
+/// By octant: the lanes of its corners.
+const PICK: [[u8; CORNERS]; OCTANTS] = {
+    let mut pick = [[0; CORNERS]; OCTANTS];
+    let mut n = 0;
+    while n < OCTANTS * CORNERS {
+        pick[n / CORNERS][n % CORNERS] = LANE[node(n / CORNERS, n % CORNERS)];
+        n += 1;
+    }
+    pick
+};
+
+/// The number of a corner of an octant.
+pub(crate) const fn node(octant: usize, corner: usize) -> usize {
+    let x = (octant & 1) + (corner & 1);
+    let y = (octant >> 1 & 1) + (corner >> 1 & 1);
+    let z = (octant >> 2) + (corner >> 2);
+    x + 3 * y + 9 * z
+}
+
+/// One cell, and memory that is used again from cell to cell.
+#[derive(Debug)]
+pub(crate) struct Octants {
+    base: DVec3,
+    error: f32,
+    points: Points,
+    offsets: [Offsets<LANES>; PARTS],
+    /// Squared distances to each triangle of the list.
+    rows: Vec<[[f32; LANES]; PARTS]>,
+    answers: Answers,
+}
+
+impl Default for Octants {
+    fn default() -> Self {
+        Self {
+            base: DVec3::ZERO,
+            error: 0.0,
+            points: Points::of_some(&[DVec3::ZERO]),
+            offsets: std::array::from_fn(|_| Offsets::from_fn(|_| DVec3::ZERO)),
+            rows: Vec::new(),
+            answers: Answers::NONE,
+        }
+    }
+}
+
+impl Octants {
+    /// Takes up a cell, the corners of its octants and its complete list.
+    pub fn measure(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES], list: &[Slot]) {
+        let lanes: [DVec3; NODES] = NODE.map(|node| nodes[usize::from(node)]);
+        self.points = Points::of_some(&lanes);
+        self.base = cell.center();
+        self.error = filter_error(tree, cell) as f32;
+        self.offsets =
+            std::array::from_fn(|part| Offsets::from_fn(|lane| lanes[(part * LANES + lane).min(NODES - 1)] - self.base));
+        measure(tree, self, list);
+    }
+
+    /// Drops from the list what the nearest points of the cell's corners rule out.
+    pub fn shorten(&mut self, feet: &[DVec3; CORNERS], list: &mut Vec<Slot>) {
+        let reach = reaches(self, &[std::array::from_fn(|corner| corner as u8); 2], &[*feet; 2]);
+        shorten(self, &reach, list);
+    }
+
+    /// The nearest triangles of the nodes that are no corners of the cell, with the bits of brute force.
+    pub fn nearest(&mut self, tree: &Tree, list: &[Slot]) -> [Candidate; NODES] {
+        nearest(tree, self, list);
+        std::array::from_fn(|node| {
+            let lane = usize::from(LANE[node]);
+            Candidate { distance_squared: self.answers.squared[lane], triangle: self.answers.triangle[lane] }
+        })
+    }
+
+    /// Fills `out` with the complete lists of the octants, from the nearest points of all nodes; keeps the list's order.
+    pub fn split(&self, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
+        out.iter_mut().for_each(Vec::clear);
+        if let &[only] = list {
+            out.iter_mut().for_each(|out| out.push(only));
+            return;
+        }
+        split(self, feet, list, out);
+    }
+}
+
+/// By witness: squared distances from the corners of two octants that a triangle must not exceed to stay.
+type Reach = [[f32; LANES]; CORNERS];
+
+multiversion!(fn measure(tree: &Tree, octants: &mut Octants, list: &[Slot]) = measure_body);
+multiversion!(fn shorten(octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) = shorten_body);
+multiversion!(fn nearest(tree: &Tree, octants: &mut Octants, list: &[Slot]) = nearest_body);
+multiversion!(fn split(octants: &Octants, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) = split_body);
+
+#[inline(always)]
+fn measure_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
+    octants.rows.clear();
+    for &slot in list {
+        let frame = tree.frame_at(slot);
+        let mut row = [[0.0; LANES]; PARTS];
+        for part in 0..PARTS {
+            frame.distances_squared::<F, LANES>(octants.base, &octants.offsets[part], &mut row[part]);
+        }
+        octants.rows.push(row);
+    }
+}
+
+/// Too large rather than too small by all errors: those of the rows, of the places and of the witnesses.
+#[inline(always)]
+fn reaches(octants: &Octants, lanes: &[[u8; CORNERS]; 2], feet: &[[DVec3; CORNERS]; 2]) -> Reach {
+    let offsets = Offsets::<LANES>::from_fn(|lane| {
+        let at = usize::from(lanes[lane / CORNERS][lane % CORNERS]);
+        DVec3::new(octants.points.x[at], octants.points.y[at], octants.points.z[at]) - octants.base
+    });
+    let mut reach = [[0.0f32; LANES]; CORNERS];
+    for (witness, reach) in reach.iter_mut().enumerate() {
+        let q = feet.map(|feet| feet[witness] - octants.base);
+        for lane in 0..LANES {
+            let q = q[lane / CORNERS];
+            let (x, y, z) = (offsets.x[lane] - q.x as f32, offsets.y[lane] - q.y as f32, offsets.z[lane] - q.z as f32);
+            let distance = (x * x + y * y + z * z).sqrt() + 2.0 * octants.error;
+            reach[lane] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
+        }
+    }
+    reach
+}
+
+/// A bit for each corner of two octants by which a triangle stays; without any of an octant's it leaves.
+#[inline(always)]
+fn stays<F: Fuse>(row: &[f32; LANES], reach: &Reach) -> (bool, bool) {
+    let (mut low, mut high) = (true, true);
+    for witness in reach {
+        let mask = F::mask_not_above(row, witness);
+        low &= mask & 0xff != 0;
+        high &= mask & 0xff00 != 0;
+    }
+    (low, high)
+}
+
+#[inline(always)]
+fn shorten_body<F: Fuse>(octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) {
+    let mut kept = 0;
+    for at in 0..list.len() {
+        let row = octants.rows[at];
+        if stays::<F>(&row[0], reach).0 {
+            (list[kept], octants.rows[kept]) = (list[at], row);
+            kept += 1;
+        }
+    }
+    list.truncate(kept);
+    octants.rows.truncate(kept);
+}
+
+#[inline(always)]
+fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
+    let Octants { rows, points, answers, error, .. } = octants;
+    *answers = Answers::NONE;
+    let mut least = [[f32::INFINITY; LANES]; PARTS];
+    for row in rows.iter() {
+        for part in 0..PARTS {
+            for lane in 0..LANES {
+                least[part][lane] = if row[part][lane] < least[part][lane] { row[part][lane] } else { least[part][lane] };
+            }
+        }
+    }
+    for least in least.as_flattened_mut() {
+        // Both sides of a comparison may be off by the error.
+        let reach = least.sqrt() + 2.0 * *error;
+        *least = reach * reach * (1.0 + 8.0 * f32::EPSILON);
+    }
+    // The cell's own corners are known, and beyond the last node are none.
+    least[0][..CORNERS].fill(-1.0);
+    least[1][NODES - LANES..].fill(-1.0);
+    for (&slot, row) in list.iter().zip(rows.iter()) {
+        let mut chosen = [0u8; PARTS * LANES];
+        let mut count = 0;
+        for part in 0..PARTS {
+            let mut mask = F::mask_not_above(&row[part], &least[part]);
+            while mask != 0 {
+                chosen[count] = (part * LANES) as u8 + mask.trailing_zeros() as u8;
+                count += 1;
+                mask &= mask - 1;
+            }
+        }
+        exact(tree, points, slot, &chosen[..count], answers);
+    }
+}
+
+#[inline(always)]
+fn split_body<F: Fuse>(octants: &Octants, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
+    let around = |octant: usize| PICK[octant].map(|lane| feet[usize::from(NODE[usize::from(lane)])]);
+    for pair in 0..OCTANTS / 2 {
+        let [first, second] = [2 * pair, 2 * pair + 1];
+        let lanes = [PICK[first], PICK[second]];
+        let reach = reaches(octants, &lanes, &[around(first), around(second)]);
+        let (left, right) = out.split_at_mut(second);
+        let (left, right) = (&mut left[first], &mut right[0]);
+        for (&slot, row) in list.iter().zip(&octants.rows) {
+            let row = row.as_flattened();
+            let row: [f32; LANES] = std::array::from_fn(|lane| row[usize::from(lanes[lane / CORNERS][lane % CORNERS]) % (PARTS * LANES)]);
+            let (low, high) = stays::<F>(&row, &reach);
+            if low {
+                left.push(slot);
+            }
+            if high {
+                right.push(slot);
+            }
+        }
+    }
+}
