@@ -69,7 +69,7 @@ pub(crate) fn gather(tree: &Tree, cell: &Aabb, near: Slot, window: Range, scratc
     range
 }
 
-/// The complete list of `cell` in `out`, of which `witness` is a point of the surface nearby; false, and no list, where
+/// The complete list of `cell` in `out`, in the order of a walk, of which `witness` is a point of the surface nearby; false, and no list, where
 /// about `most` triangles cannot be ruled out at once.
 pub(crate) fn gather_few(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, scratch: &mut Scratch, out: &mut Vec<Slot>) -> bool {
     out.clear();
@@ -78,7 +78,6 @@ pub(crate) fn gather_few(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, 
         out.clear();
         return false;
     }
-    out.sort_unstable();
     true
 }
 

@@ -81,7 +81,7 @@ impl Default for Octants {
 }
 
 impl Octants {
-    /// Takes up a cell, the corners of its octants and its complete list.
+    /// Takes up a cell, the corners of its octants and a complete list.
     pub fn measure(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES], list: &[Slot]) {
         let lanes: [DVec3; NODES] = NODE.map(|node| nodes[usize::from(node)]);
         self.points = Points::of_some(&lanes);
@@ -107,14 +107,22 @@ impl Octants {
         })
     }
 
-    /// Fills `out` with the complete lists of the octants, from the nearest points of all nodes; keeps the list's order.
-    pub fn split(&self, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
-        out.iter_mut().for_each(Vec::clear);
-        if let &[only] = list {
-            out.iter_mut().for_each(|out| out.push(only));
-            return;
+    /// Fills `out` with the complete lists of those octants that are `wanted`, a bit for each, from the nearest points of all
+    /// nodes, which have to be answered; keeps the list's order.
+    pub fn split(&self, wanted: u8, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
+        let mut octants = (0..OCTANTS).filter(|octant| wanted >> octant & 1 == 1);
+        while let Some(first) = octants.next() {
+            let second = octants.next();
+            for octant in [Some(first), second].into_iter().flatten() {
+                out[octant].clear();
+                if let &[only] = list {
+                    out[octant].push(only);
+                }
+            }
+            if list.len() > 1 {
+                split(self, &[first, second.unwrap_or(first)], feet, list, out);
+            }
         }
-        split(self, feet, list, out);
     }
 }
 
@@ -124,17 +132,18 @@ type Reach = [[f32; LANES]; CORNERS];
 multiversion!(fn measure(tree: &Tree, octants: &mut Octants, list: &[Slot]) = measure_body);
 multiversion!(fn shorten(octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) = shorten_body);
 multiversion!(fn nearest(tree: &Tree, octants: &mut Octants, list: &[Slot]) = nearest_body);
-multiversion!(fn split(octants: &Octants, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) = split_body);
+multiversion!(
+    /// The lists of two octants; one where they are the same.
+    fn split(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) = split_body
+);
 
+/// The first part, which has the corners of the cell.
 #[inline(always)]
 fn measure_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
     octants.rows.clear();
     for &slot in list {
-        let frame = tree.frame_at(slot);
         let mut row = [[0.0; LANES]; PARTS];
-        for part in 0..PARTS {
-            frame.distances_squared::<F, LANES>(octants.base, &octants.offsets[part], &mut row[part]);
-        }
+        tree.frame_at(slot).distances_squared::<F, LANES>(octants.base, &octants.offsets[0], &mut row[0]);
         octants.rows.push(row);
     }
 }
@@ -187,10 +196,11 @@ fn shorten_body<F: Fuse>(octants: &mut Octants, reach: &Reach, list: &mut Vec<Sl
 
 #[inline(always)]
 fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
-    let Octants { rows, points, answers, error, .. } = octants;
+    let Octants { base, rows, offsets, points, answers, error } = octants;
     *answers = Answers::NONE;
     let mut least = [[f32::INFINITY; LANES]; PARTS];
-    for row in rows.iter() {
+    for (&slot, row) in list.iter().zip(rows.iter_mut()) {
+        tree.frame_at(slot).distances_squared::<F, LANES>(*base, &offsets[1], &mut row[1]);
         for part in 0..PARTS {
             for lane in 0..LANES {
                 least[part][lane] = if row[part][lane] < least[part][lane] { row[part][lane] } else { least[part][lane] };
@@ -221,24 +231,23 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
 }
 
 #[inline(always)]
-fn split_body<F: Fuse>(octants: &Octants, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
-    let around = |octant: usize| PICK[octant].map(|lane| feet[usize::from(NODE[usize::from(lane)])]);
-    for pair in 0..OCTANTS / 2 {
-        let [first, second] = [2 * pair, 2 * pair + 1];
-        let lanes = [PICK[first], PICK[second]];
-        let reach = reaches(octants, &lanes, &[around(first), around(second)]);
-        let (left, right) = out.split_at_mut(second);
-        let (left, right) = (&mut left[first], &mut right[0]);
-        for (&slot, row) in list.iter().zip(&octants.rows) {
-            let row = row.as_flattened();
-            let row: [f32; LANES] = std::array::from_fn(|lane| row[usize::from(lanes[lane / CORNERS][lane % CORNERS]) % (PARTS * LANES)]);
-            let (low, high) = stays::<F>(&row, &reach);
-            if low {
-                left.push(slot);
-            }
-            if high {
-                right.push(slot);
-            }
+fn split_body<F: Fuse>(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
+    let lanes = pair.map(|octant| PICK[octant]);
+    let reach = reaches(octants, &lanes, &lanes.map(|lanes| lanes.map(|lane| feet[usize::from(NODE[usize::from(lane)])])));
+    let [first, second] = pair.map(|octant| std::mem::take(&mut out[octant]));
+    let (mut left, mut right) = (first, second);
+    let lanes: [usize; LANES] = std::array::from_fn(|lane| usize::from(lanes[lane / CORNERS][lane % CORNERS]));
+    for (&slot, row) in list.iter().zip(&octants.rows) {
+        let row = row.as_flattened();
+        let row: [f32; LANES] = std::array::from_fn(|lane| row[lanes[lane] % (PARTS * LANES)]);
+        let (low, high) = stays::<F>(&row, &reach);
+        if low {
+            left.push(slot);
+        }
+        if high {
+            right.push(slot);
         }
     }
+    out[pair[1]] = right;
+    out[pair[0]] = left;
 }

@@ -19,7 +19,7 @@
 //!    interpolation, which is exact for affine functions.
 
 use crate::bvh::cover::Range;
-use crate::bvh::tree::Slot;
+use crate::bvh::tree::{Slot, Tree};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
@@ -161,7 +161,7 @@ impl<'a> Prover<'a> {
         match at.side {
             Some(side) if at.list.len() <= SHORT && !at.list.is_empty() => {
                 let told = at.told.map(|v| side.sign() * v);
-                (known.intersection(signed(side, self.by_triangles(at, &told, limit)).widen(self.slack(&at.cell))), turn)
+                (known.intersection(signed(side, by_triangles(self.surface.tree(), at, &told, limit)).widen(self.slack(&at.cell))), turn)
             }
             _ => (known, turn),
         }
@@ -172,43 +172,17 @@ impl<'a> Prover<'a> {
         differences.widen(turn * 0.75f64.sqrt() * spacing * (1.0 + 1e-12) + self.slack(&at.cell))
     }
 
-    /// 2 and 3: contains the unsigned distance minus the interpolation of `told`; from above no sharper than `limit`.
-    fn by_triangles(&self, at: &At<'_>, told: &[f64; 8], limit: f64) -> Interval {
-        let tree = self.surface.tree();
-        let center = at.cell.center();
-        let places: [DVec3; 8] = std::array::from_fn(|j| at.cell.corner(j));
-        let mut lower = f64::INFINITY;
-        let mut rows = [[0.0; 8]; SHORT];
-        for (&slot, row) in at.list.iter().zip(&mut rows) {
-            let facet = tree.facet_at(slot);
-            *row = std::array::from_fn(|j| facet.distance_squared(places[j]).sqrt() - told[j]);
-            let foot = facet.nearest(center);
-            let distance = foot.distance_squared.sqrt();
-            let slope = (center - foot.point) / distance;
-            // On the triangle there is no tangent; zero is below.
-            let (base, slope) = if distance > 0.0 { (distance, slope) } else { (0.0, DVec3::ZERO) };
-            lower = (0..8).map(|j| base + slope.dot(places[j] - center) - told[j]).fold(lower, f64::min);
-        }
-        Interval { lower, upper: mixed(&rows[..at.list.len()], limit) }
-    }
-
     /// 4 and 5: contains the signed distance minus the interpolation, and how fast it can leave an affine function; `None`
     /// where the surface is not known to be sound.
     fn by_planes(&self, at: &At<'_>) -> Option<(Interval, f64)> {
-        let (mut mean, mut turned) = (DVec3::ZERO, 0.0f64);
-        for &slot in at.list {
+        let turned = at.list.iter().try_fold(0.0f64, |turned, &slot| {
             let plane = &self.planes[slot.0 as usize];
             let asked = || self.surface.whole(self.surface.tree().triangle(slot), at.range.upper);
             let angle = plane.apart.or_else(asked)? * plane.flat;
-            if !angle.is_finite() {
-                return None;
-            }
-            (mean, turned) = (mean + plane.normal, turned.max(angle));
-        }
-        let mean = mean.normalize_or_zero();
-        let cosine = at.list.iter().map(|&slot| self.planes[slot.0 as usize].normal.dot(mean)).fold(1.0, f64::min);
+            angle.is_finite().then(|| turned.max(angle))
+        })?;
         // With room for edges that meet but for rounding.
-        let cosine = cosine - 2.0 * turned - 1e-12;
+        let cosine = cosine(self.planes, at.list) - 2.0 * turned - 1e-12;
         if !(cosine > STEEPEST) {
             return None;
         }
@@ -225,6 +199,50 @@ impl<'a> Prover<'a> {
         let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(cell.min.abs()).max(cell.max.abs()).max_element();
         128.0 * f64::EPSILON * reach + 1e-9 * cell.radius()
     }
+}
+
+multiversion!(
+    /// 2 and 3: contains the unsigned distance minus the interpolation of `told`; from above no sharper than `limit`.
+    fn by_triangles(tree: &Tree, at: &At<'_>, told: &[f64; 8], limit: f64) -> Interval = by_triangles_body
+);
+
+#[inline(always)]
+fn by_triangles_body<F: Fuse>(tree: &Tree, at: &At<'_>, told: &[f64; 8], limit: f64) -> Interval {
+    let center = at.cell.center();
+    let places: [DVec3; 8] = std::array::from_fn(|j| at.cell.corner(j));
+    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| places[j][axis]) };
+    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
+    let mut lower = [f64::INFINITY; 8];
+    let mut rows = [[0.0; 8]; SHORT];
+    for (&slot, row) in at.list.iter().zip(&mut rows) {
+        let facet = tree.facet_at(slot);
+        for lane in 0..8 {
+            row[lane] = facet.distance_squared(DVec3::new(xs[lane], ys[lane], zs[lane])).sqrt() - told[lane];
+        }
+        let foot = facet.foot(center);
+        let away = center - (facet.a + facet.ab * foot.s + facet.ac * foot.t);
+        let distance = foot.distance_squared.sqrt();
+        // On the triangle there is no tangent; zero is below.
+        let (base, slope) = if distance > 0.0 { (distance, away / distance) } else { (0.0, DVec3::ZERO) };
+        for lane in 0..8 {
+            let (x, y, z) = (xs[lane] - center.x, ys[lane] - center.y, zs[lane] - center.z);
+            let tangent = base + (slope.x * x + slope.y * y + slope.z * z) - told[lane];
+            lower[lane] = if tangent < lower[lane] { tangent } else { lower[lane] };
+        }
+    }
+    Interval { lower: ends(&lower).0, upper: mixed(&rows[..at.list.len()], limit) }
+}
+
+multiversion!(
+    /// The least cosine of the normals of a list with their mean.
+    fn cosine(planes: &[Plane], list: &[Slot]) -> f64 = cosine_body
+);
+
+#[inline(always)]
+fn cosine_body<F: Fuse>(planes: &[Plane], list: &[Slot]) -> f64 {
+    let normals = || list.iter().map(|&slot| planes[slot.0 as usize].normal);
+    let mean = normals().sum::<DVec3>().normalize_or_zero();
+    normals().map(|normal| normal.dot(mean)).fold(1.0, f64::min)
 }
 
 /// How often a better mean is looked for.

@@ -11,7 +11,7 @@ use super::{Rule, Rules};
 use crate::bvh::Candidate;
 use crate::bvh::cover::{OCTANTS, Range, Scratch, gather_few};
 use crate::bvh::descend::Block;
-use crate::bvh::octants::{NODES, Octants};
+use crate::bvh::octants::{NODES, Octants, node};
 use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
 use crate::field::Continuity;
@@ -42,6 +42,9 @@ const MOST: usize = 512;
 /// Exact leaves this many times their half diagonal away are not divided for the sake of their lists, which are as long in
 /// the parts.
 const FAR: f64 = 3.0;
+
+/// Nearer to the surface than this part of its size every point's side is asked by itself.
+const ASKED: f64 = 1e-6;
 
 /// What no number is in.
 const NOTHING: Interval = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
@@ -204,6 +207,11 @@ impl Seen<'_> {
     }
 }
 
+/// A bit for each part of which something holds.
+fn bits(holds: impl Fn(usize) -> bool) -> u8 {
+    (0..OCTANTS).fold(0, |bits, octant| bits | u8::from(holds(octant)) << octant)
+}
+
 fn within(error: Interval, limit: f64) -> bool {
     error.upper <= limit && error.lower >= -limit
 }
@@ -213,6 +221,13 @@ struct Proof {
     /// Contains the distance minus what is told.
     known: Interval,
     parts: [Option<Interval>; OCTANTS],
+}
+
+/// Lists of parts of a cell, of which there is a bit each.
+#[derive(Default)]
+struct Parts {
+    lists: [Vec<Slot>; OCTANTS],
+    listed: u8,
 }
 
 /// The cells of one tile.
@@ -225,7 +240,7 @@ struct Builder<'a> {
     scratch: Scratch,
     octants: Octants,
     /// Lists that no cell uses at present.
-    lists: Vec<[Vec<Slot>; OCTANTS]>,
+    lists: Vec<Parts>,
     owned: Vec<Vec<Slot>>,
 }
 
@@ -246,7 +261,7 @@ impl<'a> Builder<'a> {
     /// Builds a tile.
     fn tile(&mut self, low: [i64; 3], edge: i64, run: &Run<'_>) -> Result<()> {
         let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], None));
-        self.divide(Start { low, edge, side: None, range: Range::ALL }, &corners, &[], run)
+        self.divide(self.see(Start { low, edge, side: None, range: Range::ALL }, &corners), &[], run)
     }
 
     /// Looks at a cell: its range and its side.
@@ -276,8 +291,8 @@ impl<'a> Builder<'a> {
         self.job.rules.allowed(start.range.lower / scale) * scale
     }
 
-    /// Judges a cell and, where it is a branch, its parts. `list` is complete, or empty where there is none.
-    fn divide(&mut self, start: Start, corners: &[Corner; 8], list: &[Slot], run: &Run<'_>) -> Result<()> {
+    /// What a cell says, and what follows from its corners.
+    fn see<'b>(&self, start: Start, corners: &'b [Corner; 8]) -> Seen<'b> {
         let scale = self.job.surface.scale();
         let (start, cell) = self.look(start, corners);
         let values = corners.map(|corner| (corner.value / scale) as f32);
@@ -285,27 +300,42 @@ impl<'a> Builder<'a> {
         let limit = self.allowed(&start);
         let mut seen = Seen { start, cell, corners, values, told, limit, known: Interval::ALL };
         seen.known = self.prover.coarse(&seen.at(None, &[]), limit);
-        let proven = self.job.leaves == Leaves::Linear && seen.is_within();
-        if start.edge > 1 && !proven {
+        seen
+    }
+
+    /// Whether the corners alone prove a cell with linear leaves.
+    fn is_proven(&self, seen: &Seen<'_>) -> bool {
+        self.job.leaves == Leaves::Linear && seen.is_within()
+    }
+
+    /// Judges a cell and, where it is a branch, its parts. `list` is complete, or empty where there is none.
+    fn divide(&mut self, mut seen: Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
+        let proven = self.is_proven(&seen);
+        if seen.start.edge > 1 && !proven {
             return self.look_inside(seen, list, run);
         }
         let mut own = self.owned.pop().unwrap_or_default();
         let mut list = list;
-        if list.is_empty() && !proven && gather_few(self.job.surface.tree(), &cell, witness(corners), LISTED, &mut self.scratch, &mut own) {
+        if list.is_empty() && !proven && self.gather(&seen, LISTED, &mut own) {
             list = &own;
         }
         if !proven && !list.is_empty() && self.job.leaves == Leaves::Linear {
-            seen.known = self.prover.fine(&seen.at(None, list), seen.known, limit).0;
+            seen.known = self.prover.fine(&seen.at(None, list), seen.known, seen.limit).0;
         }
         let done = self.push_leaf(&seen, list, run);
         self.owned.push(own);
         done
     }
 
+    /// The complete list of a cell, of no more than about `most` triangles.
+    fn gather(&mut self, seen: &Seen<'_>, most: usize, list: &mut Vec<Slot>) -> bool {
+        gather_few(self.job.surface.tree(), &seen.cell, witness(seen.corners), most, &mut self.scratch, list)
+    }
+
     /// Judges a cell by the corners of its parts, and divides it where that is not enough.
     fn look_inside(&mut self, mut seen: Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
         let mut own = self.owned.pop().unwrap_or_default();
-        let few = list.is_empty() && gather_few(self.job.surface.tree(), &seen.cell, witness(seen.corners), MOST, &mut self.scratch, &mut own);
+        let few = list.is_empty() && self.gather(&seen, MOST, &mut own);
         let mut halves = Halves::new(seen.corners);
         if few {
             self.measure(&seen.start, &seen.cell, &own);
@@ -327,13 +357,18 @@ impl<'a> Builder<'a> {
             Leaves::Exact => (seen.start.range.lower >= FAR * seen.cell.radius() || (1..=LIST).contains(&list.len()), None),
             Leaves::Linear => self.prove(&mut seen, &mut halves, list),
         };
-        let done = if leaf { self.push_leaf(&seen, list, run) } else { self.branch(&seen, &mut halves, list, lists, run) };
+        let done = if leaf {
+            self.lists.extend(lists);
+            self.push_leaf(&seen, list, run)
+        } else {
+            self.branch(&seen, &mut halves, list, lists, run)
+        };
         self.owned.push(own);
         done
     }
 
     /// Whether a cell with linear leaves need not be divided; and the lists of its parts, where they were needed to know.
-    fn prove(&mut self, seen: &mut Seen<'_>, halves: &mut Halves, list: &[Slot]) -> (bool, Option<[Vec<Slot>; OCTANTS]>) {
+    fn prove(&mut self, seen: &mut Seen<'_>, halves: &mut Halves, list: &[Slot]) -> (bool, Option<Parts>) {
         let blended = blend(&seen.told);
         // A sample that is too far off ends the hope.
         if !self.is_close(&seen.start, halves, &blended, seen.limit) {
@@ -357,17 +392,21 @@ impl<'a> Builder<'a> {
         if seen.is_within() {
             return (true, None);
         }
-        let mut lists = self.lists.pop().unwrap_or_default();
-        self.octants.split(&halves.feet(), list, &mut lists);
-        let mut whole = NOTHING;
-        for octant in 0..OCTANTS {
-            let corners = halves.corners(octant);
-            let (cell, part) = self.part(seen.start.part(octant), &corners);
+        let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
+        let parts: [_; OCTANTS] = std::array::from_fn(|octant| {
+            let (cell, part) = self.part(seen.start.part(octant), &corners[octant]);
             let told = of_part(&blended, octant);
-            let at = At { cell, range: part.range, side: part.side, corners: &corners, center: None, told, list: &lists[octant] };
-            let mut known = proof.parts[octant].unwrap_or_else(|| self.prover.coarse(&at, seen.limit));
-            if !within(known, seen.limit) {
-                known = self.prover.fine(&at, known, seen.limit).0;
+            let at = At { cell, range: part.range, side: part.side, corners: &corners[octant], center: None, told, list: &[] };
+            let known = proof.parts[octant].unwrap_or_else(|| self.prover.coarse(&at, seen.limit));
+            (at, known)
+        });
+        let wanted = bits(|octant| !within(parts[octant].1, seen.limit));
+        let lists = self.split(wanted, halves, list, None);
+        let mut whole = NOTHING;
+        for (octant, (at, known)) in parts.into_iter().enumerate() {
+            let mut known = known;
+            if wanted >> octant & 1 == 1 {
+                known = self.prover.fine(&At { list: &lists.lists[octant], ..at }, known, seen.limit).0;
             }
             whole = whole.hull(known);
             if self.fails(known, seen.limit) {
@@ -377,6 +416,17 @@ impl<'a> Builder<'a> {
         }
         seen.known = seen.known.intersection(whole);
         (samples || seen.is_within(), Some(lists))
+    }
+
+    /// The complete lists of parts of the cell that was taken up; `lists` has some of them.
+    fn split(&mut self, wanted: u8, halves: &Halves, list: &[Slot], lists: Option<Parts>) -> Parts {
+        let mut parts = lists.unwrap_or_else(|| Parts { listed: 0, ..self.lists.pop().unwrap_or_default() });
+        let missing = if list.is_empty() { 0 } else { wanted & !parts.listed };
+        if missing != 0 {
+            self.octants.split(missing, &halves.feet(), list, &mut parts.lists);
+            parts.listed |= missing;
+        }
+        parts
     }
 
     /// Proves the parts of a cell one by one by their corners. Where one fails a cell will be divided, or its list is looked
@@ -420,21 +470,18 @@ impl<'a> Builder<'a> {
         seen: &Seen<'_>,
         halves: &mut Halves,
         list: &[Slot],
-        lists: Option<[Vec<Slot>; OCTANTS]>,
+        lists: Option<Parts>,
         run: &Run<'_>,
     ) -> Result<()> {
         self.push(seen, LevelKind::Branch, Box::default(), run)?;
         (0..NODES).for_each(|number| self.ask(&seen.start, halves, number));
-        let lists = lists.unwrap_or_else(|| {
-            let mut lists = self.lists.pop().unwrap_or_default();
-            lists.iter_mut().for_each(Vec::clear);
-            if !list.is_empty() {
-                self.octants.split(&halves.feet(), list, &mut lists);
-            }
-            lists
-        });
-        for octant in 0..OCTANTS {
-            self.divide(seen.start.part(octant), &halves.corners(octant), &lists[octant], run)?;
+        let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
+        let parts: [_; OCTANTS] = std::array::from_fn(|octant| self.see(seen.start.part(octant), &corners[octant]));
+        let wanted = bits(|octant| !self.is_proven(&parts[octant]));
+        let lists = self.split(wanted, halves, list, lists);
+        for (octant, part) in parts.into_iter().enumerate() {
+            let list: &[Slot] = if lists.listed >> octant & 1 == 1 { &lists.lists[octant] } else { &[] };
+            self.divide(part, list, run)?;
         }
         self.lists.push(lists);
         Ok(())
@@ -479,11 +526,16 @@ impl<'a> Builder<'a> {
     fn answer(&mut self, start: &Start, halves: &mut Halves, list: &[Slot]) {
         let Job { surface, lattice, .. } = *self.job;
         let answers = self.octants.nearest(surface.tree(), list);
-        let asked_once = start.side.is_none() && !surface.side_changes_at_surface_only();
+        let parted = surface.side_changes_at_surface_only();
+        let near: [Corner; 8] = std::array::from_fn(|corner| *halves.corner(node(corner, corner)));
         for number in INNER {
             let place = start.node(number);
-            let found = || found(surface, lattice.corner(place[0], place[1], place[2]), answers[number], start.side);
-            halves.set(number, if asked_once { *self.corners.entry(key(place)).or_insert_with(found) } else { found() });
+            let (p, answer) = (lattice.corner(place[0], place[1], place[2]), answers[number]);
+            let found = || {
+                let side = start.side.or_else(|| if parted { side_by(surface, p, answer.distance_squared.sqrt(), &near) } else { None });
+                found(surface, p, answer, side)
+            };
+            halves.set(number, if parted { found() } else { *self.corners.entry(key(place)).or_insert_with(found) });
         }
     }
 
@@ -553,8 +605,23 @@ fn witness(corners: &[Corner; 8]) -> DVec3 {
 
 /// The one side of a cell that the surface does not touch, where the side changes at the surface only.
 fn one_side(corners: &[Corner; 8]) -> Option<Side> {
-    let certain = corners.iter().find(|corner| corner.certain)?;
-    Some(if certain.value < 0.0 { Side::Inside } else { Side::Outside })
+    corners.iter().find(|corner| corner.certain).map(|corner| side_of(corner.value))
+}
+
+/// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
+/// no room between them for the surface at which alone it changes.
+fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner]) -> Option<Side> {
+    let apart = ASKED * (surface.tree().radius + p.abs().max_element());
+    let carries = |corner: &&Corner| {
+        let reach = distance + corner.value.abs();
+        corner.certain && corner.value.abs() > apart && (corner.point - p).length_squared() * (1.0 + 1e-9) < reach * reach
+    };
+    if distance > apart { near.iter().find(carries).map(|corner| side_of(corner.value)) } else { None }
+}
+
+/// The side of a distance that is certain.
+fn side_of(value: f64) -> Side {
+    if value < 0.0 { Side::Inside } else { Side::Outside }
 }
 
 /// The one side of a ball that the surface does not touch, if that is certain.
