@@ -19,6 +19,7 @@ use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::grid::Grid;
 use crate::run::Run;
+use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
 /// Depth of the cells that workers take; no leaf is coarser.
@@ -596,16 +597,25 @@ fn key(place: [i64; 3]) -> u64 {
     place.iter().fold(0, |key, &i| key << 21 | i as u64)
 }
 
-/// The one of the corners' nearest points whose greatest distance from the cell is least.
-fn witness(corners: &[Corner; 8]) -> DVec3 {
-    let reach = |foot: DVec3| corners.iter().map(|corner| (corner.point - foot).length_squared()).fold(0.0, f64::max);
-    let nearer = |best: (f64, DVec3), foot| if reach(foot) < best.0 { (reach(foot), foot) } else { best };
-    corners.iter().map(|corner| corner.foot).fold((f64::INFINITY, corners[0].foot), nearer).1
-}
+multiversion!(
+    /// The one of the corners' nearest points whose greatest distance from the corners is least.
+    fn witness(corners: &[Corner; 8]) -> DVec3 = witness_body
+);
 
-/// The one side of a cell that the surface does not touch, where the side changes at the surface only.
-fn one_side(corners: &[Corner; 8]) -> Option<Side> {
-    corners.iter().find(|corner| corner.certain).map(|corner| side_of(corner.value))
+#[inline(always)]
+fn witness_body<F: Fuse>(corners: &[Corner; 8]) -> DVec3 {
+    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].foot[axis]) };
+    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
+    let mut reach = [0.0; 8];
+    for Corner { point, .. } in corners {
+        for lane in 0..8 {
+            let (x, y, z) = (xs[lane] - point.x, ys[lane] - point.y, zs[lane] - point.z);
+            let squared = x * x + y * y + z * z;
+            reach[lane] = if squared > reach[lane] { squared } else { reach[lane] };
+        }
+    }
+    let best = (1..8).fold(0, |best, j| if reach[j] < reach[best] { j } else { best });
+    corners[best].foot
 }
 
 /// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
