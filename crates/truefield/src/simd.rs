@@ -17,6 +17,13 @@ pub(crate) trait Fuse: Copy {
 
     /// Whether any `a[i] > limit`.
     fn any_above(a: &[u32; 16], limit: u32) -> bool;
+
+    /// Lane i: that of `a` which `lanes[i]` names, modulo 32.
+    #[inline(always)]
+    fn pick(a: &[[f32; 16]; 2], lanes: &[u32; 16]) -> [f32; 16] {
+        let a = a.as_flattened();
+        std::array::from_fn(|i| a[(lanes[i] % 32) as usize])
+    }
 }
 
 /// Two roundings: any machine.
@@ -115,6 +122,19 @@ impl Fuse for Avx512 {
                 intrinsics::_mm512_set1_epi32(limit as i32),
             ) != 0
         }
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn pick(a: &[[f32; 16]; 2], lanes: &[u32; 16]) -> [f32; 16] {
+        let mut out = [0.0; 16];
+        // SAFETY: AVX-512 was detected; all arrays are sixteen words, and neither loads nor stores need alignment.
+        unsafe {
+            let (low, high) = (intrinsics::_mm512_loadu_ps(a[0].as_ptr()), intrinsics::_mm512_loadu_ps(a[1].as_ptr()));
+            let picked = intrinsics::_mm512_permutex2var_ps(low, intrinsics::_mm512_loadu_si512(lanes.as_ptr().cast()), high);
+            intrinsics::_mm512_storeu_ps(out.as_mut_ptr(), picked);
+        }
+        out
     }
 }
 

@@ -236,11 +236,9 @@ fn split_body<F: Fuse>(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODE
     let reach = reaches(octants, &lanes, &lanes.map(|lanes| lanes.map(|lane| feet[usize::from(NODE[usize::from(lane)])])));
     let [first, second] = pair.map(|octant| std::mem::take(&mut out[octant]));
     let (mut left, mut right) = (first, second);
-    let lanes: [usize; LANES] = std::array::from_fn(|lane| usize::from(lanes[lane / CORNERS][lane % CORNERS]));
+    let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane / CORNERS][lane % CORNERS]));
     for (&slot, row) in list.iter().zip(&octants.rows) {
-        let row = row.as_flattened();
-        let row: [f32; LANES] = std::array::from_fn(|lane| row[lanes[lane] % (PARTS * LANES)]);
-        let (low, high) = stays::<F>(&row, &reach);
+        let (low, high) = stays::<F>(&F::pick(row, &lanes), &reach);
         if low {
             left.push(slot);
         }

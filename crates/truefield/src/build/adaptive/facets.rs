@@ -144,26 +144,26 @@ impl<'a> Prover<'a> {
         known.widen(self.slack(&at.cell))
     }
 
-    /// Sharpens `known` by the triangles of the list, until it is within `limit`. Also returns how fast the distance less
-    /// some affine function can change, at most 1.
-    pub fn fine(&self, at: &At<'_>, known: Interval, limit: f64) -> (Interval, f64) {
-        let (mut known, mut turn) = (known, 1.0);
-        if at.list.len() <= PLANES
-            && at.corners.iter().all(|corner| corner.certain)
-            && let Some((found, found_turn)) = self.by_planes(at)
-        {
-            known = known.intersection(found.widen(self.slack(&at.cell)));
-            turn = found_turn;
-            if known.upper.max(-known.lower) <= limit {
-                return (known, turn);
-            }
+    /// Sharpens `known` by the planes of the list's triangles. Also returns how fast the distance less some affine function
+    /// can change, at most 1.
+    pub fn planes(&self, at: &At<'_>, known: Interval) -> (Interval, f64) {
+        if at.list.len() > PLANES || !at.corners.iter().all(|corner| corner.certain) {
+            return (known, 1.0);
         }
+        match self.by_planes(at) {
+            Some((found, turn)) => (known.intersection(found.widen(self.slack(&at.cell))), turn),
+            None => (known, 1.0),
+        }
+    }
+
+    /// Sharpens `known` by the triangles of the list, from above until it is within `limit`.
+    pub fn triangles(&self, at: &At<'_>, known: Interval, limit: f64) -> Interval {
         match at.side {
             Some(side) if at.list.len() <= SHORT && !at.list.is_empty() => {
                 let told = at.told.map(|v| side.sign() * v);
-                (known.intersection(signed(side, by_triangles(self.surface.tree(), at, &told, limit)).widen(self.slack(&at.cell))), turn)
+                known.intersection(signed(side, by_triangles(self.surface.tree(), at, &told, limit)).widen(self.slack(&at.cell)))
             }
-            _ => (known, turn),
+            _ => known,
         }
     }
 

@@ -10,12 +10,11 @@ use super::halves::{CENTER, Halves, INNER, blend, of_part, steps};
 use super::{Rule, Rules};
 use crate::bvh::Candidate;
 use crate::bvh::cover::{OCTANTS, Range, Scratch, gather_few};
-use crate::bvh::descend::Block;
 use crate::bvh::octants::{NODES, Octants, node};
 use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind, Levels, ListSide, Record, Root};
+use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind, Levels, ListSide, Record, Root, derive_errors};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::grid::Grid;
 use crate::run::Run;
@@ -91,27 +90,28 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let lattice =
         Grid { origin: root.extent.min * scale, spacing: edge * scale * (-f64::from(depth)).exp2(), first: [0; 3], shape: [1 << depth; 3] };
     let planes = if leaves == Leaves::Linear { Plane::all(surface) } else { Vec::new() };
-    let job = Job { surface, planes: &planes, lattice: &lattice, depth, leaves, rules, cells: AtomicU64::new(0) };
-    let edge = 1i64 << (depth - tiles);
-    let blocks = Block::tiles(&lattice, edge);
-    let parts = run.blocks("build the tree", blocks.len(), |number| {
+    let job = Job { surface, planes: &planes, lattice: &lattice, depth, tiles, leaves, rules, cells: AtomicU64::new(0) };
+    let parts = run.blocks("build the tree", 1 << (3 * tiles), |number| {
         let mut builder = Builder::new(&job);
-        builder.tile(blocks[number].low, edge, run)?;
-        Ok(builder.cells)
+        builder.tile(from_curve(number), 1 << (depth - tiles), run)?;
+        derive_errors(&mut builder.levels, Division::Octree);
+        Ok(builder.levels)
     })?;
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
-    let mut cells: Vec<Node> = parts.into_iter().flatten().collect();
+    let coverage = Coverage::of(&root, Some(surface.mesh().extent()));
     let mut builder = Builder::new(&job);
-    for above in 0..tiles {
-        for number in 0..8u32.pow(above) {
-            let index = from_curve(u64::from(number));
-            cells.push(builder.inner(above, index));
+    let mut levels: Vec<Level> = (0..tiles).map(|above| builder.inner(above)).collect();
+    // Along the curve the cells of one tile follow those of the one before, at every depth.
+    levels.push(Level::default());
+    for part in parts {
+        for (number, level) in part.into_iter().enumerate() {
+            let number = number + tiles as usize;
+            levels.resize_with(levels.len().max(number + 1), Level::default);
+            levels[number].append(level);
         }
     }
-    let coverage = Coverage::of(&root, Some(surface.mesh().extent()));
-    let mut levels = assemble(&cells, Levels { coverage, ..Levels::new(root, continuity, rules.accuracy()) });
-    drop(cells);
-    levels.derive_errors();
+    derive_errors(&mut levels[..=tiles as usize], Division::Octree);
+    let levels = Levels { coverage, levels, ..Levels::new(root, continuity, rules.accuracy()) };
     AdaptiveField::from_levels(&levels, (leaves == Leaves::Exact).then(|| Arc::clone(surface)), run)
 }
 
@@ -122,19 +122,11 @@ struct Job<'a> {
     lattice: &'a Grid,
     /// Depth of single lattice cells.
     depth: u32,
+    /// Depth of the tiles.
+    tiles: u32,
     leaves: Leaves,
     rules: &'a Rules,
     cells: AtomicU64,
-}
-
-/// A cell that is done.
-struct Node {
-    depth: u32,
-    /// Its place on the curve that visits siblings in their order.
-    place: u64,
-    kind: LevelKind,
-    record: Record,
-    list: (ListSide, Box<[u32]>),
 }
 
 /// A cell to be judged, and what its parent knew.
@@ -237,7 +229,9 @@ struct Builder<'a> {
     prover: Prover<'a>,
     /// Corners that were searched for in the tree, or whose sides are dear.
     corners: HashMap<u64, Corner, BuildHasherDefault<Mix>>,
-    cells: Vec<Node>,
+    /// Those of the tile, from its own on, siblings side by side.
+    levels: Vec<Level>,
+    count: usize,
     scratch: Scratch,
     octants: Octants,
     /// Lists that no cell uses at present.
@@ -251,7 +245,8 @@ impl<'a> Builder<'a> {
             job,
             prover: Prover::new(job.surface, job.planes),
             corners: HashMap::default(),
-            cells: Vec::new(),
+            levels: Vec::new(),
+            count: 0,
             scratch: Scratch::default(),
             octants: Octants::default(),
             lists: Vec::new(),
@@ -259,8 +254,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Builds a tile.
-    fn tile(&mut self, low: [i64; 3], edge: i64, run: &Run<'_>) -> Result<()> {
+    /// Builds a tile, of which there are so many before it along each axis.
+    fn tile(&mut self, index: [i64; 3], edge: i64, run: &Run<'_>) -> Result<()> {
+        let low = index.map(|index| index * edge);
         let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], None));
         self.divide(self.see(Start { low, edge, side: None, range: Range::ALL }, &corners), &[], run)
     }
@@ -321,7 +317,7 @@ impl<'a> Builder<'a> {
             list = &own;
         }
         if !proven && !list.is_empty() && self.job.leaves == Leaves::Linear {
-            seen.known = self.prover.fine(&seen.at(None, list), seen.known, seen.limit).0;
+            seen.known = self.prover.planes(&seen.at(None, list), seen.known).0;
         }
         let done = self.push_leaf(&seen, list, run);
         self.owned.push(own);
@@ -382,8 +378,10 @@ impl<'a> Builder<'a> {
             return (samples || seen.is_within(), None);
         }
         let at = seen.at(Some(halves.corner(CENTER).foot), list);
-        let (known, turn) = self.prover.fine(&at, seen.known, seen.limit);
-        let mut known = known;
+        let (mut known, turn) = self.prover.planes(&at, seen.known);
+        if !samples && !within(known, seen.limit) {
+            known = self.prover.triangles(&at, known, seen.limit);
+        }
         if turn < 1.0 && !within(known, seen.limit) {
             let differences = (0..NODES).map(|number| Interval::exact(halves.corner(number).value - blended[number]));
             let differences = differences.fold(NOTHING, Interval::hull);
@@ -407,7 +405,11 @@ impl<'a> Builder<'a> {
         for (octant, (at, known)) in parts.into_iter().enumerate() {
             let mut known = known;
             if wanted >> octant & 1 == 1 {
-                known = self.prover.fine(&At { list: &lists.lists[octant], ..at }, known, seen.limit).0;
+                let at = At { list: &lists.lists[octant], ..at };
+                known = self.prover.planes(&at, known).0;
+                if !samples && !within(known, seen.limit) {
+                    known = self.prover.triangles(&at, known, seen.limit);
+                }
             }
             whole = whole.hull(known);
             if self.fails(known, seen.limit) {
@@ -456,13 +458,15 @@ impl<'a> Builder<'a> {
 
     /// Stores a leaf.
     fn push_leaf(&mut self, seen: &Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
+        if self.job.leaves == Leaves::Linear {
+            self.push(seen, LevelKind::Linear, run)?;
+            return Ok(());
+        }
         let tree = self.job.surface.tree();
-        let (kind, kept) = match self.job.leaves {
-            Leaves::Linear => (LevelKind::Linear, Box::default()),
-            Leaves::Exact if list.len() <= LONGEST => (LevelKind::Exact, list.iter().map(|&slot| tree.triangle(slot)).collect()),
-            Leaves::Exact => (LevelKind::Exact, Box::default()),
-        };
-        self.push(seen, kind, kept, run)
+        let kept = if list.len() <= LONGEST { list } else { &[] };
+        let level = self.push(seen, LevelKind::Exact, run)?;
+        level.lists.add(list_side(seen.start.side), kept.iter().map(|&slot| tree.triangle(slot)));
+        Ok(())
     }
 
     /// Stores a cell and divides it.
@@ -474,7 +478,7 @@ impl<'a> Builder<'a> {
         lists: Option<Parts>,
         run: &Run<'_>,
     ) -> Result<()> {
-        self.push(seen, LevelKind::Branch, Box::default(), run)?;
+        self.push(seen, LevelKind::Branch, run)?;
         (0..NODES).for_each(|number| self.ask(&seen.start, halves, number));
         let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
         let parts: [_; OCTANTS] = std::array::from_fn(|octant| self.see(seen.start.part(octant), &corners[octant]));
@@ -488,20 +492,22 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    fn push(&mut self, seen: &Seen<'_>, kind: LevelKind, list: Box<[u32]>, run: &Run<'_>) -> Result<()> {
-        let Job { surface, depth, rules, .. } = *self.job;
-        let Start { low, edge, side, .. } = seen.start;
+    /// Stores a cell; the lists of its level are for the caller to keep up.
+    fn push(&mut self, seen: &Seen<'_>, kind: LevelKind, run: &Run<'_>) -> Result<&mut Level> {
+        let Job { surface, depth, tiles, rules, .. } = *self.job;
         let scale = surface.scale();
         let record = Record::new(seen.values, Interval { lower: seen.known.lower / scale, upper: seen.known.upper / scale });
-        let level = depth - edge.trailing_zeros();
-        let place = along_curve(low.map(|low| (low / edge) as u32));
-        self.cells.push(Node { depth: level, place, kind, record, list: (list_side(side), list) });
-        if self.cells.len().is_multiple_of(COUNTED) {
+        let level = depth - seen.start.edge.trailing_zeros();
+        self.count += 1;
+        if self.count.is_multiple_of(COUNTED) {
             run.cancel.check()?;
             let cells = self.job.cells.fetch_add(COUNTED as u64, Ordering::Relaxed) + COUNTED as u64;
             rules.fits(level, cells, cells, f64::from(record.upper.max(-record.lower)))?;
         }
-        Ok(())
+        let number = (level - tiles) as usize;
+        self.levels.resize_with(self.levels.len().max(number + 1), Level::default);
+        self.levels[number].push(kind, record);
+        Ok(&mut self.levels[number])
     }
 
     /// Asks for the corners of the parts of a cell; stops, with false, at one whose side is certain that is farther than
@@ -555,17 +561,17 @@ impl<'a> Builder<'a> {
         *self.corners.entry(key(place)).or_insert_with(found)
     }
 
-    /// An inner cell above the tiles.
-    fn inner(&mut self, depth: u32, index: [u32; 3]) -> Node {
-        let Job { surface, lattice, .. } = *self.job;
+    /// A level above the tiles.
+    fn inner(&mut self, depth: u32) -> Level {
+        let Job { surface, .. } = *self.job;
         let edge = 1i64 << (self.job.depth - depth);
-        let values = std::array::from_fn(|octant| {
-            let place = [0, 1, 2].map(|axis| (i64::from(index[axis]) + (octant >> axis & 1) as i64) * edge);
-            let p = lattice.corner(place[0], place[1], place[2]);
-            (corner(surface, p, &[], None).value / surface.scale()) as f32
-        });
-        let record = Record::new(values, Interval::ALL);
-        Node { depth, place: along_curve(index), kind: LevelKind::Branch, record, list: (ListSide::Asked, Box::default()) }
+        let mut level = Level::default();
+        for number in 0..1 << (3 * depth) {
+            let low = from_curve(number).map(|index| index * edge);
+            let values = std::array::from_fn(|octant| (self.corner(place(low, edge, octant), &[], None).value / surface.scale()) as f32);
+            level.push(LevelKind::Branch, Record::new(values, Interval::ALL));
+        }
+        level
     }
 }
 
@@ -618,6 +624,11 @@ fn witness_body<F: Fuse>(corners: &[Corner; 8]) -> DVec3 {
     corners[best].foot
 }
 
+/// The one side of a cell that the surface does not touch, where the side changes at the surface only.
+fn one_side(corners: &[Corner; 8]) -> Option<Side> {
+    corners.iter().find(|corner| corner.certain).map(|corner| side_of(corner.value))
+}
+
 /// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
 /// no room between them for the surface at which alone it changes.
 fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner]) -> Option<Side> {
@@ -648,45 +659,9 @@ fn list_side(side: Option<Side>) -> ListSide {
     }
 }
 
-/// Cells in any order to levels.
-fn assemble(cells: &[Node], empty: Levels) -> Levels {
-    let deepest = cells.iter().map(|cell| cell.depth).max().unwrap_or(0) as usize;
-    let mut order: Vec<Vec<(u64, u32)>> = vec![Vec::new(); deepest + 1];
-    for (number, cell) in cells.iter().enumerate() {
-        order[cell.depth as usize].push((cell.place, number as u32));
-    }
-    let levels = order.into_iter().map(|mut order| {
-        order.sort_unstable();
-        let mut level = Level::default();
-        for (_, number) in order {
-            let cell = &cells[number as usize];
-            level.push(cell.kind, cell.record);
-            if cell.kind == LevelKind::Exact {
-                level.lists.push(cell.list.0, &cell.list.1);
-            }
-        }
-        level
-    });
-    Levels { levels: levels.collect(), ..empty }
-}
-
-/// Bits of x, y and z in turn, x lowest: cells of one depth in the order of their parents, siblings in theirs.
-fn along_curve(index: [u32; 3]) -> u64 {
-    (0..3).map(|axis| spread(u64::from(index[axis])) << axis).sum()
-}
-
-/// Two empty bits after each of 21.
-fn spread(x: u64) -> u64 {
-    let x = (x | x << 32) & 0x001f_0000_0000_ffff;
-    let x = (x | x << 16) & 0x001f_0000_ff00_00ff;
-    let x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
-    let x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
-    (x | x << 2) & 0x1249_2492_4924_9249
-}
-
-/// The index whose place on the curve is `place`, for few cells.
-fn from_curve(place: u64) -> [u32; 3] {
-    std::array::from_fn(|axis| (0..21).map(|bit| ((place >> (3 * bit + axis)) & 1) as u32 * (1 << bit)).sum())
+/// The index along each axis of a place on the curve that visits siblings in their order.
+fn from_curve(place: usize) -> [i64; 3] {
+    std::array::from_fn(|axis| (0..TILES).map(|bit| (place >> (3 * bit as usize + axis) & 1) as i64 * (1 << bit)).sum())
 }
 
 /// Mixes the bits of keys that are whole numbers.

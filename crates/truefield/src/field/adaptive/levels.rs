@@ -67,10 +67,7 @@ impl Level {
         self.kinds.append(&mut other.kinds);
         self.records.append(&mut other.records);
         self.cubics.append(&mut other.cubics);
-        for number in 0..other.lists.ends.len() {
-            let (side, list) = other.lists.get(number);
-            self.lists.push(side, list);
-        }
+        self.lists.append(&other.lists);
     }
 
     /// Cells that have children.
@@ -100,31 +97,9 @@ impl Levels {
         Self { root, continuity, accuracy, coverage: Coverage::Unknown, edits: Edits::default(), levels: Vec::new() }
     }
 
-    /// Gives inner cells the errors that follow from their children's, where those are smaller: what children say is
-    /// trilinear where their parent's interpolation is too, so that the difference is largest at their corners. No error is
-    /// less than those of the children, so that a coarser tree never promises more.
+    /// See [`derive_errors`].
     pub fn derive_errors(&mut self) {
-        let division = self.root.division;
-        let group = division.children();
-        for depth in (1..self.levels.len()).rev() {
-            let (above, below) = self.levels.split_at_mut(depth);
-            let (Some(parents), Some(level)) = (above.last_mut(), below.first()) else { return };
-            let mut cubics = level.cubics.iter();
-            let mut children = level.records.chunks_exact(group).zip(level.kinds.chunks_exact(group));
-            let branches = parents.kinds.iter().zip(&mut parents.records).filter(|(kind, _)| **kind == LevelKind::Branch);
-            for ((_, parent), (records, kinds)) in branches.zip(&mut children) {
-                let (mut derived, mut least): (Option<Interval>, Interval) = (None, Interval::exact(0.0));
-                for (octant, (child, kind)) in records.iter().zip(kinds).enumerate() {
-                    let samples = if *kind == LevelKind::Cubic { cubics.next() } else { None };
-                    let error = about_corners(child, samples).plus(differences(parent, &child.corners, division, octant));
-                    derived = Some(derived.map_or(error, |derived| derived.hull(error)));
-                    least = least.hull(child.error());
-                }
-                let rounding = 1e-14 * parent.corners.iter().fold(0.0, |size, &v| f64::max(size, f64::from(v.abs())));
-                let derived = derived.unwrap_or(Interval::ALL).widen(rounding).intersection(parent.error());
-                *parent = Record::new(parent.corners, derived.hull(least));
-            }
-        }
+        derive_errors(&mut self.levels, self.root.division);
     }
 
     /// Cuts off what is deeper; cells of the last level are leaves then.
@@ -180,6 +155,32 @@ impl Levels {
             return wrong(self.levels.len(), "is missing");
         }
         Ok(())
+    }
+}
+
+/// Gives inner cells the errors that follow from their children's, where those are smaller: what children say is
+/// trilinear where their parent's interpolation is too, so that the difference is largest at their corners. No error is
+/// less than those of the children, so that a coarser tree never promises more.
+pub(crate) fn derive_errors(levels: &mut [Level], division: Division) {
+    let group = division.children();
+    for depth in (1..levels.len()).rev() {
+        let (above, below) = levels.split_at_mut(depth);
+        let (Some(parents), Some(level)) = (above.last_mut(), below.first()) else { return };
+        let mut cubics = level.cubics.iter();
+        let mut children = level.records.chunks_exact(group).zip(level.kinds.chunks_exact(group));
+        let branches = parents.kinds.iter().zip(&mut parents.records).filter(|(kind, _)| **kind == LevelKind::Branch);
+        for ((_, parent), (records, kinds)) in branches.zip(&mut children) {
+            let (mut derived, mut least): (Option<Interval>, Interval) = (None, Interval::exact(0.0));
+            for (octant, (child, kind)) in records.iter().zip(kinds).enumerate() {
+                let samples = if *kind == LevelKind::Cubic { cubics.next() } else { None };
+                let error = about_corners(child, samples).plus(differences(parent, &child.corners, division, octant));
+                derived = Some(derived.map_or(error, |derived| derived.hull(error)));
+                least = least.hull(child.error());
+            }
+            let rounding = 1e-14 * parent.corners.iter().fold(0.0, |size, &v| f64::max(size, f64::from(v.abs())));
+            let derived = derived.unwrap_or(Interval::ALL).widen(rounding).intersection(parent.error());
+            *parent = Record::new(parent.corners, derived.hull(least));
+        }
     }
 }
 

@@ -30,6 +30,7 @@ pub use coverage::Coverage;
 pub(crate) use cubic::{bends, third as cubic_third, value as cubic_value, weights as cubic_weights};
 pub(crate) use edits::farthest;
 pub use edits::{Change, Edit, Edits};
+pub(crate) use levels::derive_errors;
 pub use levels::{Level, LevelKind, Levels};
 pub(crate) use page::{Kind, Page};
 pub use page::{ListSide, Lists, Record, Samples};

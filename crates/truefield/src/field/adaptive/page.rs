@@ -134,7 +134,20 @@ pub struct Lists {
 impl Lists {
     /// Adds a list and returns its number.
     pub fn push(&mut self, side: ListSide, triangles: &[u32]) -> usize {
-        self.triangles.extend_from_slice(triangles);
+        self.add(side, triangles.iter().copied())
+    }
+
+    /// Adds all lists of others.
+    pub(crate) fn append(&mut self, others: &Self) {
+        let before = self.triangles.len() as u32;
+        self.triangles.extend_from_slice(&others.triangles);
+        self.sides.extend_from_slice(&others.sides);
+        self.ends.extend(others.ends.iter().map(|end| before + end));
+    }
+
+    /// [`Lists::push`] of what is not an array yet.
+    pub(crate) fn add(&mut self, side: ListSide, triangles: impl Iterator<Item = u32>) -> usize {
+        self.triangles.extend(triangles);
         self.ends.push(self.triangles.len() as u32);
         self.sides.push(side);
         self.ends.len() - 1
