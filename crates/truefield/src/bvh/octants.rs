@@ -87,8 +87,7 @@ impl Octants {
         self.points = Points::of_some(&lanes);
         self.base = cell.center();
         self.error = filter_error(tree, cell) as f32;
-        self.offsets =
-            std::array::from_fn(|part| Offsets::from_fn(|lane| lanes[(part * LANES + lane).min(NODES - 1)] - self.base));
+        self.offsets = std::array::from_fn(|part| Offsets::from_fn(|lane| lanes[(part * LANES + lane).min(NODES - 1)] - self.base));
         measure(tree, self, list);
     }
 
@@ -248,4 +247,107 @@ fn split_body<F: Fuse>(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODE
     }
     out[pair[1]] = right;
     out[pair[0]] = left;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::Random;
+    use crate::mesh::TriangleMesh;
+    use crate::run::Run;
+    use crate::simd::Plain;
+
+    /// Triangles of a size, some of them twice.
+    fn soup(random: &mut Random, count: u32, size: f64) -> Tree {
+        let mut vertices = Vec::new();
+        for _ in 0..count {
+            let middle = random.direction() * random.unit();
+            vertices.extend((0..3).map(|_| middle + random.direction() * size));
+        }
+        let triangles = (0..count).chain(0..count / 8).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        Tree::build(&TriangleMesh::new(vertices, triangles).expect("a soup"), &Run::default()).expect("a tree")
+    }
+
+    fn judge(tree: &Tree, p: DVec3) -> Candidate {
+        let mut best = Candidate::within(f64::INFINITY);
+        for t in 0..tree.len() as u32 {
+            best.offer(tree.facet(t).distance_squared(p), t);
+        }
+        best
+    }
+
+    fn nodes(cell: &Aabb) -> [DVec3; NODES] {
+        std::array::from_fn(|n| cell.min + 0.5 * cell.size() * DVec3::new((n % 3) as f64, (n / 3 % 3) as f64, (n / 9) as f64))
+    }
+
+    #[test]
+    fn nodes_and_points_of_octants_find_their_nearest_triangles_in_the_lists() {
+        let mut random = Random::new(3);
+        let mut octants = Octants::default();
+        let mut shortened = 0;
+        for (count, size) in [(1, 1.0), (2, 0.3), (60, 0.3), (400, 0.05), (300, 1e-4)] {
+            let tree = soup(&mut random, count, size);
+            for round in 0..60 {
+                let middle = random.direction() * random.between(0.0, 2.0);
+                let half = DVec3::splat(random.length(1e-4, 0.5));
+                let cell = Aabb::new(middle - half, middle + half);
+                let nodes = nodes(&cell);
+                let found = nodes.map(|p| judge(&tree, p));
+                let feet = std::array::from_fn(|n| tree.facet(found[n].triangle).nearest(nodes[n]).point);
+                let mut list: Vec<Slot> = (0..tree.len() as u32).map(Slot).collect();
+                octants.measure(&tree, &cell, &nodes, &list);
+                if round % 2 == 0 {
+                    octants.shorten(&std::array::from_fn(|corner| feet[node(corner, corner)]), &mut list);
+                    assert!(list.is_sorted() && !list.is_empty());
+                    shortened += tree.len() - list.len();
+                }
+                let answers = octants.nearest(&tree, &list);
+                for n in (0..NODES).filter(|n| (0..CORNERS).all(|corner| node(corner, corner) != *n)) {
+                    assert_eq!(answers[n], found[n], "node {n} of {cell:?}, {count} triangles of {size}");
+                }
+                let wanted = random.below(256) as u8;
+                let mut lists: [Vec<Slot>; OCTANTS] = std::array::from_fn(|_| vec![Slot(u32::MAX)]);
+                octants.split(wanted, &feet, &list, &mut lists);
+                for octant in 0..OCTANTS {
+                    if wanted >> octant & 1 == 0 {
+                        assert_eq!(lists[octant], [Slot(u32::MAX)], "octant {octant} was not wanted");
+                        continue;
+                    }
+                    assert!(lists[octant].is_sorted() && lists[octant].iter().all(|slot| list.contains(slot)));
+                    let low = nodes[node(octant, 0)];
+                    for _ in 0..20 {
+                        let p = low + half * DVec3::new(random.unit(), random.unit(), random.unit());
+                        let nearest = judge(&tree, p);
+                        let kept = lists[octant].iter().any(|&slot| tree.triangle(slot) == nearest.triangle);
+                        assert!(kept, "{p} in octant {octant} of {cell:?}, {count} triangles of {size}");
+                    }
+                }
+            }
+        }
+        assert!(shortened > 10_000, "only {shortened} triangles were ruled out");
+    }
+
+    #[test]
+    fn every_corner_of_an_octant_is_picked_from_its_lane() {
+        let row: [[f32; LANES]; PARTS] = std::array::from_fn(|part| std::array::from_fn(|lane| (part * LANES + lane) as f32));
+        for (octant, lanes) in PICK.iter().enumerate() {
+            let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane % CORNERS]));
+            let picked = Plain::pick(&row, &lanes);
+            for lane in 0..LANES {
+                let n = usize::from(NODE[picked[lane] as usize]);
+                assert_eq!(n, node(octant, lane % CORNERS));
+            }
+            assert_eq!(native(&row, &lanes), picked);
+        }
+    }
+
+    multiversion!(
+        /// What this machine runs.
+        fn native(row: &[[f32; LANES]; PARTS], lanes: &[u32; LANES]) -> [f32; LANES] = native_body
+    );
+
+    #[inline(always)]
+    fn native_body<F: Fuse>(row: &[[f32; LANES]; PARTS], lanes: &[u32; LANES]) -> [f32; LANES] {
+        F::pick(row, lanes)
+    }
 }

@@ -439,7 +439,8 @@ impl<'a> Builder<'a> {
         for octant in 0..OCTANTS {
             let corners = halves.corners(octant);
             let (cell, start) = self.part(start.part(octant), &corners);
-            let at = At { cell, range: start.range, side: start.side, corners: &corners, center: None, told: of_part(told, octant), list: &[] };
+            let at =
+                At { cell, range: start.range, side: start.side, corners: &corners, center: None, told: of_part(told, octant), list: &[] };
             let part = self.prover.coarse(&at, limit);
             proof.parts[octant] = Some(part);
             proof.known = proof.known.hull(part);
@@ -470,14 +471,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Stores a cell and divides it.
-    fn branch(
-        &mut self,
-        seen: &Seen<'_>,
-        halves: &mut Halves,
-        list: &[Slot],
-        lists: Option<Parts>,
-        run: &Run<'_>,
-    ) -> Result<()> {
+    fn branch(&mut self, seen: &Seen<'_>, halves: &mut Halves, list: &[Slot], lists: Option<Parts>, run: &Run<'_>) -> Result<()> {
         self.push(seen, LevelKind::Branch, run)?;
         (0..NODES).for_each(|number| self.ask(&seen.start, halves, number));
         let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
