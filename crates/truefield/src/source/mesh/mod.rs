@@ -1,5 +1,6 @@
 //! A triangle mesh ready to be asked: tree and sign rule.
 
+mod below;
 mod check;
 mod layers;
 mod pseudonormal;
@@ -16,7 +17,7 @@ pub use sign::{Side, SignChoice, SignKind, SignRule};
 use crate::bvh::{Candidate, Tree};
 use crate::distance::{Closest, Distance};
 use crate::error::{Error, Result};
-use crate::geom::{Aabb, DVec3, FacetPoint, Feature, Interval, Nearest};
+use crate::geom::{Aabb, Affine, DVec3, FacetPoint, Feature, Interval, Nearest};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
@@ -209,6 +210,10 @@ impl Distance for Surface {
 
     fn over(&self, cell: &Aabb) -> Interval {
         self.over_from(self.at(cell.center()), cell)
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        self.plane_below(cell)
     }
 }
 
