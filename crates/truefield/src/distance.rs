@@ -8,6 +8,11 @@ pub trait Distance: Send + Sync {
     /// The box of the shape, or of a field's domain; `None` when unbounded.
     fn extent(&self) -> Option<Aabb>;
 
+    /// A box beyond which all is certain to be outside, if one is known.
+    fn enclosure(&self) -> Option<Aabb> {
+        None
+    }
+
     /// The interval that contains the true signed distance at `p`.
     fn at(&self, p: DVec3) -> Interval;
 

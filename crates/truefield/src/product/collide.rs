@@ -9,7 +9,7 @@
 
 use std::collections::BinaryHeap;
 
-use super::clearance::{Patience, clearance};
+use super::clearance::{Clearance, Patience, clearance};
 use crate::distance::Distance;
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, Affine, DVec3, Interval};
@@ -18,6 +18,16 @@ use crate::source::waiting::Waiting;
 
 /// Boxes that are divided at a time: the result depends on it, and not on the number of threads.
 const BATCH: usize = 64;
+
+/// Boxes that any search may ask about.
+const LEAST: usize = 4096;
+
+/// Boxes before it is asked what the solids themselves leave open.
+const SURE: usize = 2048;
+
+/// Boxes that are larger than what is open by this may tell more when they are divided; such that are smaller by this not.
+pub(super) const COARSE: f64 = 4.0;
+pub(super) const FINE: f64 = 0.25;
 
 /// Steps that lead to a witness on a surface.
 const STEPS: usize = 60;
@@ -62,24 +72,31 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
         return Err(Error::invalid(format!("the tolerance is {tolerance}; give a positive length")));
     }
     let start = domain(f, g)?;
-    let mut best = Best { upper: f64::INFINITY, at: start.center(), sum: f64::INFINITY, between: start.center() };
-    let first = Asked::of(f, g, &start, best.least());
-    best.offer(&first);
-    let mut heap = BinaryHeap::from([Waiting { bound: first.lower, number: 0, item: start }]);
-    let (mut boxes, mut patience) = (1, Patience::default());
     let apart = clearance(f, g, &start, tolerance, budget / 2, run)?;
-    boxes = boxes.max(apart.boxes);
-    best.offer_way(apart.upper, apart.at);
+    let mut best = Best::new(&apart);
     if apart.lower > 0.0 {
-        let known = Interval { lower: apart.lower.min(best.sum), upper: best.sum };
-        return Ok(best.collision(f, g, known, &start, boxes));
+        let known = Interval { lower: apart.lower.min(best.way), upper: best.way };
+        return Ok(best.collision(f, g, known, &start, apart.boxes));
     }
+    // The middle of the shortest way, and each point of both, is no farther from either than half of such a way.
+    let reach = (0.5 * best.way).min(start.diagonal()) + 1e-9 * start.diagonal();
+    let near = [f, g].map(|solid| solid.enclosure().map_or(start, |enclosure| enclosure.grow(reach)));
+    let both = Aabb::new(near[0].min.max(near[1].min), near[0].max.min(near[1].max));
+    if both.min.cmpgt(both.max).any() {
+        return Ok(best.collision(f, g, Interval { lower: 0.0, upper: best.way }, &start, apart.boxes));
+    }
+    let first = Asked::of(f, g, &both, best.least());
+    best.offer(&first);
+    let mut heap = BinaryHeap::from([Waiting { bound: first.lower, number: 0, item: both }]);
+    let (mut boxes, mut patience) = (apart.boxes + 1, Patience::new(LEAST));
     loop {
         let floor = heap.peek().map_or(best.least(), |first| first.bound).min(best.least());
         let known = best.separation(floor);
         run.progress.report("search for contact", boxes.min(budget), budget);
-        // Half of it, since a way is twice the least.
-        if known.width() <= tolerance || boxes >= budget || heap.is_empty() || patience.ends(boxes, known.width()) {
+        let decided = known.lower > 0.0 || known.upper < 0.0 || boxes >= apart.boxes + LEAST;
+        let in_doubt = boxes >= apart.boxes + SURE && heap.peek().is_some_and(|first| in_doubt(f, g, &first.item, known.width()));
+        let told = known.width() <= tolerance && decided || in_doubt || heap.is_empty();
+        if told || boxes >= budget || patience.ends(boxes, known.width()) {
             return Ok(best.collision(f, g, known, &start, boxes));
         }
         let mut batch = Vec::with_capacity(8 * BATCH);
@@ -113,6 +130,12 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
     }
 }
 
+/// Whether what is open comes from what the solids themselves leave open in a box, and not from its size.
+fn in_doubt(f: &dyn Distance, g: &dyn Distance, extent: &Aabb, gap: f64) -> bool {
+    let (center, size) = (extent.center(), extent.diagonal());
+    size <= COARSE * gap && (size < FINE * gap || gap <= f.at(center).width() + g.at(center).width())
+}
+
 /// What is known of a box.
 struct Asked {
     /// No more than max(f, g) anywhere in it.
@@ -121,7 +144,7 @@ struct Asked {
     /// No less than max(f, g) in the middle.
     upper: f64,
     /// No less than the way from one solid to the other by the middle.
-    sum: f64,
+    way: f64,
 }
 
 impl Asked {
@@ -136,7 +159,7 @@ impl Asked {
         if lower <= enough {
             lower = lower.max(least_of_greater(&f.below(extent), &g.below(extent), 0.5 * extent.size()));
         }
-        Self { lower, center, upper: a.upper.max(b.upper), sum: a.upper.max(0.0) + b.upper.max(0.0) }
+        Self { lower, center, upper: a.upper.max(b.upper), way: a.upper.max(0.0) + b.upper.max(0.0) }
     }
 }
 
@@ -155,35 +178,36 @@ struct Best {
     /// Least upper end of max(f, g).
     upper: f64,
     at: DVec3,
-    /// Least upper end of the way through one point.
-    sum: f64,
-    between: DVec3,
+    /// Least upper end of the way from one to the other.
+    way: f64,
+    /// Between which points it leads.
+    ends: [DVec3; 2],
 }
 
 impl Best {
+    /// Only a way is known.
+    fn new(apart: &Clearance) -> Self {
+        Self { upper: f64::INFINITY, at: apart.ends[0], way: apart.upper, ends: apart.ends }
+    }
+
     fn offer(&mut self, asked: &Asked) {
         if asked.upper < self.upper {
             (self.upper, self.at) = (asked.upper, asked.center);
         }
-        self.offer_way(asked.sum, asked.center);
-    }
-
-    /// Takes a way from one solid to the other by a point.
-    fn offer_way(&mut self, sum: f64, by: DVec3) {
-        if sum < self.sum {
-            (self.sum, self.between) = (sum, by);
+        if asked.way < self.way {
+            (self.way, self.ends) = (asked.way, [asked.center; 2]);
         }
     }
 
     /// No less than the least of max(f, g): half of a way, too.
     fn least(&self) -> f64 {
-        self.upper.min(0.5 * self.sum)
+        self.upper.min(0.5 * self.way)
     }
 
     /// What is known of the separation, if max(f, g) is nowhere below `floor`.
     fn separation(&self, floor: f64) -> Interval {
         let lower = if floor > 0.0 { 2.0 * floor } else { floor };
-        let upper = if self.upper > 0.0 { (2.0 * self.upper).min(self.sum) } else { self.upper };
+        let upper = if self.upper > 0.0 { (2.0 * self.upper).min(self.way) } else { self.upper };
         Interval { lower: lower.min(upper), upper }
     }
 
@@ -197,7 +221,7 @@ impl Best {
         };
         let (first, second) = if contact == Contact::Separated {
             let step = 1e-6 * start.diagonal();
-            (foot(f, self.between, step, STEPS), foot(g, self.between, step, STEPS))
+            (foot(f, self.ends[0], step, STEPS), foot(g, self.ends[1], step, STEPS))
         } else {
             (self.at, self.at)
         };
@@ -206,7 +230,7 @@ impl Best {
 }
 
 /// A point of the surface, by going against the slope as far as the distance says.
-pub(super) fn foot(f: &dyn Distance, from: DVec3, step: f64, steps: usize) -> DVec3 {
+fn foot(f: &dyn Distance, from: DVec3, step: f64, steps: usize) -> DVec3 {
     let value = |p: DVec3| {
         let known = f.at(p);
         0.5 * known.lower + 0.5 * known.upper

@@ -5,6 +5,7 @@ pub mod collide;
 pub mod contour;
 pub mod dual;
 pub mod medial;
+mod piece;
 pub mod raycast;
 pub mod render;
 pub mod sampled;

@@ -9,6 +9,7 @@ pub(crate) mod kink;
 pub mod mesh;
 pub mod patch;
 pub mod polygon;
+pub(crate) mod tangent;
 pub(crate) mod waiting;
 
 pub use ask::{bounds, gradients, values};

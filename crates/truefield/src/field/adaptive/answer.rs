@@ -20,6 +20,10 @@ impl Distance for AdaptiveField {
         Some(self.root.extent)
     }
 
+    fn enclosure(&self) -> Option<Aabb> {
+        (self.coverage == Coverage::Whole && self.continuity == Continuity::Everywhere).then_some(self.root.extent)
+    }
+
     /// From the leaf's error. Outside the domain, of a field that holds its whole solid, from the nearest place that may
     /// be surface; else from the nearest point of the domain.
     fn at(&self, p: DVec3) -> Interval {

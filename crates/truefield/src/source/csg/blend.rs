@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::Result;
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
+use crate::source::tangent;
 
 use super::kept::kept;
 use super::level;
@@ -90,6 +91,10 @@ impl Distance for Blend {
     fn extent(&self) -> Option<Aabb> {
         let both = self.shapes[0].extent()?.union(self.shapes[1].extent()?);
         Some(both.grow(self.bulge(0.0)))
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        tangent::below(self, cell)
     }
 
     fn at(&self, p: DVec3) -> Interval {

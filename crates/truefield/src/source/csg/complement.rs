@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
+use crate::source::tangent;
 
 use super::union::Union;
 
@@ -54,6 +55,10 @@ pub fn difference(shape: &Arc<dyn Source>, others: &[Arc<dyn Source>]) -> Result
 impl Distance for Complement {
     fn extent(&self) -> Option<Aabb> {
         self.extent
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        tangent::below(self, cell)
     }
 
     fn at(&self, p: DVec3) -> Interval {

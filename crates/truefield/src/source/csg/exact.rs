@@ -2,7 +2,7 @@
 
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::Result;
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
 
 use super::measure::rounding;
 use crate::source::kink::{self, Operand, Seam};
@@ -42,6 +42,18 @@ pub trait Exact: Send + Sync {
 impl<T: Exact> Distance for T {
     fn extent(&self) -> Option<Aabb> {
         self.hull()
+    }
+
+    fn enclosure(&self) -> Option<Aabb> {
+        self.hull()
+    }
+
+    /// Along the tangent: exact slopes are right where they jump upward, too.
+    fn below(&self, cell: &Aabb) -> Affine {
+        let (center, bend, least) = (cell.center(), self.curving(cell), self.over(cell).lower);
+        let radius = cell.radius() * (1.0 + 1e-12);
+        let value = self.value(center) + 0.5 * bend.lower.min(0.0) * radius * radius - 1e-14 * radius - 2.0 * self.rounding();
+        if value > least { Affine { value, slope: self.slope(center) } } else { Affine::constant(least) }
     }
 
     fn at(&self, p: DVec3) -> Interval {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
+use crate::source::tangent;
 
 use super::complement::{Complement, difference};
 use super::kept::kept;
@@ -62,6 +63,10 @@ pub fn shell(shape: &Arc<dyn Source>, thickness: f64) -> Result<Complement> {
 impl Distance for Offset {
     fn extent(&self) -> Option<Aabb> {
         self.shape.extent().map(|extent| extent.grow(self.distance))
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        tangent::below(self, cell)
     }
 
     fn at(&self, p: DVec3) -> Interval {

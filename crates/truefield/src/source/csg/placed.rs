@@ -6,7 +6,7 @@ use glam::DMat3;
 
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
 
 use super::measure::{direction, length, point};
 
@@ -200,6 +200,17 @@ impl Placed {
 impl Distance for Placed {
     fn extent(&self) -> Option<Aabb> {
         self.shape.extent().map(|extent| self.placement.extent_outward(&extent))
+    }
+
+    fn enclosure(&self) -> Option<Aabb> {
+        self.shape.enclosure().map(|enclosure| self.placement.extent_outward(&enclosure))
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        let turned = self.placement.inward_box(cell);
+        let Affine { value, slope } = self.shape.below(&turned);
+        let value = value + slope.dot(self.placement.inward(cell.center()) - turned.center());
+        Affine { value: value * self.placement.scale - self.noise(), slope: self.placement.turned(slope) }
     }
 
     fn at(&self, p: DVec3) -> Interval {

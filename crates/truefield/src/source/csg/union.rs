@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
+use crate::source::tangent;
 
 use super::boxes::Boxes;
 use super::kept::is_exact_outside;
@@ -201,6 +202,14 @@ fn least(found: &[Candidate]) -> Candidate {
 impl Distance for Union {
     fn extent(&self) -> Option<Aabb> {
         self.extent
+    }
+
+    fn enclosure(&self) -> Option<Aabb> {
+        self.parts.iter().map(|part| part.enclosure()).reduce(|a, b| Some(a?.union(b?))).flatten()
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        tangent::below(self, cell)
     }
 
     fn at(&self, p: DVec3) -> Interval {

@@ -11,7 +11,7 @@
 
 use std::collections::BinaryHeap;
 
-use super::{SignKind, Side, Surface};
+use super::{Side, SignKind, Surface};
 use crate::bvh::Candidate;
 use crate::bvh::tree::{ABSENT, LEAF, Node, Tree, WIDTH};
 use crate::geom::{Aabb, Affine, DVec3, Facet};
@@ -63,7 +63,11 @@ impl Surface {
             _ if !self.side_changes_at_surface_only() => {
                 clear && self.side_of_ball(center, &foot, found.triangle, radius) == Some(Side::Outside)
             }
-            _ => height >= ball.radius || side == Side::Outside && height < -slip || self.is_outside(center + normal * (0.5 * (height + ball.radius))),
+            _ => {
+                height >= ball.radius
+                    || side == Side::Outside && height < -slip
+                    || self.is_outside(center + normal * (0.5 * (height + ball.radius)))
+            }
         };
         let plane = of(height + 2.0 * self.signs.blur());
         if outside && plane.value > best.value { plane } else { best }

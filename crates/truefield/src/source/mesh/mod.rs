@@ -202,6 +202,10 @@ impl Distance for Surface {
         Some(self.mesh.extent())
     }
 
+    fn enclosure(&self) -> Option<Aabb> {
+        self.side_changes_at_surface_only().then(|| self.mesh.extent())
+    }
+
     fn at(&self, p: DVec3) -> Interval {
         let p = p * self.scale;
         let (foot, side) = self.foot_and_side(p, self.tree.nearest(p, Candidate::within(f64::INFINITY)));
