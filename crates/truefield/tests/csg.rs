@@ -135,6 +135,16 @@ fn cells(name: &str, shape: &dyn Source, p: DVec3, size: f64, round: f64, random
             "{name}: {bend:?} over {cell:?}, {second} from {a} to {b}"
         );
     }
+    let (below, half) = (shape.below(&cell), 0.5 * cell.size());
+    for i in 0..14 {
+        let q = if i < 8 { cell.corner(i) } else { random.within(&cell) };
+        let said = below.value + below.slope.dot(q - cell.center());
+        let most = shape.at(q).upper;
+        assert!(
+            said <= most + round && said.abs() <= below.value.abs() + half.length(),
+            "{name}: {said} at {q} of {cell:?}, {below:?}, {most}"
+        );
+    }
     let (slope, step) = (gradient(shape, p), 1e-6 * size);
     let direction = random.direction();
     let curve = shape.bend(&Aabb::new(p, p).grow(step));

@@ -26,8 +26,11 @@ const LEAST: usize = 4096;
 const SURE: usize = 2048;
 
 /// Boxes that are larger than what is open by this may tell more when they are divided; such that are smaller by this not.
-pub(super) const COARSE: f64 = 4.0;
+pub(super) const COARSE: f64 = 2.0;
 pub(super) const FINE: f64 = 0.25;
+
+/// What division has to raise a bound by, of what is open.
+pub(super) const GAIN: f64 = 0.1;
 
 /// Steps that lead to a witness on a surface.
 const STEPS: usize = 60;
@@ -87,14 +90,14 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
     }
     let first = Asked::of(f, g, &both, best.least());
     best.offer(&first);
-    let mut heap = BinaryHeap::from([Waiting { bound: first.lower, number: 0, item: both }]);
+    let mut heap = BinaryHeap::from([Waiting { bound: first.lower, number: 0, item: (both, f64::NEG_INFINITY) }]);
     let (mut boxes, mut patience) = (apart.boxes + 1, Patience::new(LEAST));
     loop {
         let floor = heap.peek().map_or(best.least(), |first| first.bound).min(best.least());
         let known = best.separation(floor);
         run.progress.report("search for contact", boxes.min(budget), budget);
         let decided = known.lower > 0.0 || known.upper < 0.0 || boxes >= apart.boxes + LEAST;
-        let in_doubt = boxes >= apart.boxes + SURE && heap.peek().is_some_and(|first| in_doubt(f, g, &first.item, known.width()));
+        let in_doubt = boxes >= apart.boxes + SURE && heap.peek().is_some_and(|first| in_doubt(f, g, first, known.width()));
         let told = known.width() <= tolerance && decided || in_doubt || heap.is_empty();
         if told || boxes >= budget || patience.ends(boxes, known.width()) {
             return Ok(best.collision(f, g, known, &start, boxes));
@@ -107,23 +110,23 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
                 heap.clear();
                 break;
             }
-            let Some(parts) = octants(&candidate.item) else {
+            let Some(parts) = octants(&candidate.item.0) else {
                 heap.push(candidate);
                 break;
             };
-            batch.extend(parts);
+            batch.extend(parts.map(|part| (part, candidate.bound)));
         }
         if batch.is_empty() {
             return Ok(best.collision(f, g, known, &start, boxes));
         }
         let found = run.blocks("search for contact", batch.len().div_ceil(8), |block| {
             let extents = &batch[8 * block..(8 * block + 8).min(batch.len())];
-            Ok(extents.iter().map(|extent| Asked::of(f, g, extent, best.least())).collect::<Vec<_>>())
+            Ok(extents.iter().map(|(extent, _)| Asked::of(f, g, extent, best.least())).collect::<Vec<_>>())
         })?;
-        for (&extent, asked) in batch.iter().zip(found.into_iter().flatten()) {
+        for (&item, asked) in batch.iter().zip(found.into_iter().flatten()) {
             best.offer(&asked);
             if asked.lower <= best.least() {
-                heap.push(Waiting { bound: asked.lower, number: boxes, item: extent });
+                heap.push(Waiting { bound: asked.lower, number: boxes, item });
             }
             boxes += 1;
         }
@@ -131,9 +134,10 @@ pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize
 }
 
 /// Whether what is open comes from what the solids themselves leave open in a box, and not from its size.
-fn in_doubt(f: &dyn Distance, g: &dyn Distance, extent: &Aabb, gap: f64) -> bool {
+fn in_doubt(f: &dyn Distance, g: &dyn Distance, first: &Waiting<(Aabb, f64)>, gap: f64) -> bool {
+    let (extent, before) = first.item;
     let (center, size) = (extent.center(), extent.diagonal());
-    size <= COARSE * gap && (size < FINE * gap || gap <= f.at(center).width() + g.at(center).width())
+    size <= COARSE * gap && first.bound - before <= GAIN * gap && (size < FINE * gap || gap <= f.at(center).width() + g.at(center).width())
 }
 
 /// What is known of a box.
@@ -230,7 +234,7 @@ impl Best {
 }
 
 /// A point of the surface, by going against the slope as far as the distance says.
-fn foot(f: &dyn Distance, from: DVec3, step: f64, steps: usize) -> DVec3 {
+pub(super) fn foot(f: &dyn Distance, from: DVec3, step: f64, steps: usize) -> DVec3 {
     let value = |p: DVec3| {
         let known = f.at(p);
         0.5 * known.lower + 0.5 * known.upper

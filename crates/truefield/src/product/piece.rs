@@ -78,6 +78,12 @@ impl Piece {
         least_where(&Affine { value: 0.0, slope: u }, &self.plane, 0.5 * self.hull.size())
     }
 
+    /// No more than an affine function on a box anywhere in the piece.
+    pub fn least_of(&self, of: &Affine, extent: &Aabb) -> f64 {
+        let value = of.value + of.slope.dot(self.hull.center() - extent.center());
+        least_where(&Affine { value, ..*of }, &self.plane, 0.5 * self.hull.size())
+    }
+
     /// The way to another; all that is asked for of one that is longer than `enough` is that it is.
     pub fn to(&self, other: &Self, enough: f64) -> Gap {
         let gap = (self.hull.min - other.hull.max).max(other.hull.min - self.hull.max).max(DVec3::ZERO);

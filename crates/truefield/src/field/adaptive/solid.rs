@@ -6,7 +6,7 @@ use super::{AdaptiveField, Cell, Coverage, Division, Leaf};
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Affine, DVec3, Interval};
 
 /// Leaves of a block up to which their borders are compared.
 const FEW: usize = 32;
@@ -150,6 +150,14 @@ impl Distance for Solid {
 
     fn over(&self, cell: &Aabb) -> Interval {
         self.field.over(cell)
+    }
+
+    fn below(&self, cell: &Aabb) -> Affine {
+        self.field.below(cell)
+    }
+
+    fn enclosure(&self) -> Option<Aabb> {
+        self.field.enclosure()
     }
 }
 
