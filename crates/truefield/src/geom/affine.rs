@@ -23,6 +23,19 @@ impl Affine {
         self.value - self.slope.abs().dot(half)
     }
 
+    /// Of two lower bounds in a box of this radius the one that is higher in the middle: this one, or the same everywhere.
+    /// At a point, which has no radius, the slope is kept.
+    #[must_use]
+    pub fn or_constant(self, least: f64, radius: f64) -> Self {
+        if radius == 0.0 {
+            Self { value: self.value.max(least), ..self }
+        } else if self.value > least {
+            self
+        } else {
+            Self::constant(least)
+        }
+    }
+
     /// `self` and `other` by parts of one.
     #[must_use]
     pub fn mix(&self, other: &Self, part: f64) -> Self {

@@ -219,7 +219,7 @@ fn larger(solids: &[Solid<'_>; 2], pair: [usize; 2]) -> Option<usize> {
 fn sides<'a>(f: &'a dyn Distance, g: &'a dyn Distance, start: &Aabb, step: f64) -> [Solid<'a>; 2] {
     let sloping = [f, g].map(|solid| {
         let at = foot(solid, start.center(), step, STEPS);
-        solid.below(&Aabb::new(at, at).grow(step)).slope != DVec3::ZERO
+        solid.below(&Aabb::new(at, at)).slope != DVec3::ZERO
     });
     let size = |solid: &dyn Distance| solid.extent().map_or(f64::INFINITY, |extent| extent.diagonal());
     let against = match sloping {

@@ -10,11 +10,8 @@ const STEP: f64 = 1e-5;
 /// [`Distance::below`](crate::distance::Distance::below) of a shape, where its slope does not jump in the box, nor does its
 /// distance lie below its values by an unknown length; else the least distance.
 pub(crate) fn below(shape: &dyn Source, cell: &Aabb) -> Affine {
-    let least = Affine::constant(shape.over(cell).lower);
-    match tangent(shape, cell) {
-        Some(tangent) if tangent.value > least.value => tangent,
-        _ => least,
-    }
+    let least = shape.over(cell).lower;
+    tangent(shape, cell).map_or(Affine::constant(least), |tangent| tangent.or_constant(least, cell.radius()))
 }
 
 fn tangent(shape: &dyn Source, cell: &Aabb) -> Option<Affine> {

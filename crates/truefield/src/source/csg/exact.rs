@@ -53,7 +53,8 @@ impl<T: Exact> Distance for T {
         let (center, bend, least) = (cell.center(), self.curving(cell), self.over(cell).lower);
         let radius = cell.radius() * (1.0 + 1e-12);
         let value = self.value(center) + 0.5 * bend.lower.min(0.0) * radius * radius - 1e-14 * radius - 2.0 * self.rounding();
-        if value > least { Affine { value, slope: self.slope(center) } } else { Affine::constant(least) }
+        let tangent = Affine { value, slope: self.slope(center) };
+        tangent.or_constant(least, radius)
     }
 
     fn at(&self, p: DVec3) -> Interval {
