@@ -62,10 +62,11 @@ def collide(
         threads: worker threads; the answer never depends on them.
         progress: called as `progress(phase, fraction)`.
 
-    Searches boxes, best first, with what both solids say over each: for the shortest way from one to the other, and
-    where they may meet for the deepest common point. Fields tell their slope over a box too, so that faces that run in
-    parallel are seen from afar; between shapes, the number of boxes grows with the square of such faces' size over
-    the tolerance. A field built in a domain that cuts its solid is known there only: contact beyond may be undecided.
+    Searches pairs of boxes, best first, for the shortest way from one solid to the other, each box with the plane that
+    its solid stays behind; and where they may meet, boxes of both for the deepest common point. Fields, meshes and most
+    shapes tell such planes, so that faces that run in parallel are told apart by large boxes; functions, formulas and
+    patches tell none, and for them the number of boxes grows with the square of such faces' size over the tolerance.
+    A field built in a domain that cuts its solid is known there only: contact beyond may be undecided.
     Where fields leave more open than the tolerance, the search ends when asking on tells no more.
 
     Raises:

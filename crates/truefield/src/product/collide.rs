@@ -68,8 +68,9 @@ pub struct Collision {
 /// Finds how two solids lie to each other, to `tolerance`, asking about no more than `budget` boxes.
 ///
 /// The interval contains the truth however early the search ends, and is no wider than `tolerance` where the budget was enough
-/// and the solids are exact; where they leave more open, it ends when asking on tells no more. Where surfaces run in parallel, the number of boxes grows with the square of their size over the
-/// tolerance. Refuses two solids without an end, and a tolerance that is no positive length.
+/// and the solids are exact; where they leave more open, it ends when asking on tells no more. Of solids that tell no slope
+/// ([`Distance::below`]) the number of boxes grows with the square of the size of surfaces in parallel over the tolerance. Refuses
+/// two solids without an end, and a tolerance that is no positive length.
 pub fn collide(f: &dyn Distance, g: &dyn Distance, tolerance: f64, budget: usize, run: &Run<'_>) -> Result<Collision> {
     if !(tolerance > 0.0 && tolerance.is_finite()) {
         return Err(Error::invalid(format!("the tolerance is {tolerance}; give a positive length")));
