@@ -25,12 +25,13 @@ pub fn mesh(vertices: &PyReadonlyArray2<'_, f64>, triangles: &PyReadonlyArray2<'
 
 /// An (n, 3) float64 array.
 pub fn rows<'py>(py: Python<'py>, points: impl ExactSizeIterator<Item = DVec3>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    let count = points.len();
-    let mut flat = Vec::with_capacity(3 * count);
-    for p in points {
-        flat.extend_from_slice(&p.to_array());
-    }
-    flat.into_pyarray(py).reshape([count, 3])
+    flat_rows(py, points.map(|p| p.to_array()).collect())
+}
+
+/// The same of rows that are arrays already, without a copy.
+pub fn flat_rows(py: Python<'_>, rows: Vec<[f64; 3]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let count = rows.len();
+    rows.into_flattened().into_pyarray(py).reshape([count, 3])
 }
 
 /// An (n,) array.

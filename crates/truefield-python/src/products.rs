@@ -11,7 +11,7 @@ use truefield::product::render::{Background, Canvas, Finish, render_field};
 use truefield::{Aabb, Distance, Error};
 
 use crate::adaptive::PyAdaptiveField;
-use crate::convert::{column, points, rows};
+use crate::convert::{column, flat_rows, points, rows};
 use crate::door::{job, raise};
 use crate::render::{PyCamera, samples};
 use crate::shape::PyShape;
@@ -43,11 +43,7 @@ pub fn cast_rays<'py>(
 ) -> PyResult<(Floats<'py>, Rows<'py>, Rows<'py>)> {
     let (origins, directions, method) = (points(&origins)?, points(&directions)?, self::method(method)?);
     let hits = job(py, threads, progress, |run| field.caster(distance, run)?.cast(&origins, &directions, method, run))?;
-    Ok((
-        column(py, hits.iter().map(|hit| hit.distance)),
-        rows(py, hits.iter().map(|hit| hit.point))?,
-        rows(py, hits.iter().map(|hit| hit.normal))?,
-    ))
+    Ok((hits.distances.into_pyarray(py), flat_rows(py, hits.points)?, flat_rows(py, hits.normals)?))
 }
 
 /// Whether rays meet anything within a length.

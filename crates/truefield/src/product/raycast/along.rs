@@ -16,6 +16,18 @@ pub(super) fn trilinear(corners: &[f32; 8], [x, y, z]: [f64; 3]) -> f64 {
     low + (high - low) * z
 }
 
+/// Its slopes along the three axes.
+#[inline(always)]
+pub(super) fn trilinear_slopes(corners: &[f32; 8], at: [f64; 3]) -> [f64; 3] {
+    let c = corners.map(f64::from);
+    std::array::from_fn(|axis| {
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        let edge = |low: usize| c[low + (1 << axis)] - c[low];
+        let row = |low: usize| edge(low) + (edge(low + (1 << i)) - edge(low)) * at[i];
+        row(0) + (row(1 << j) - row(0)) * at[j]
+    })
+}
+
 /// A cubic from 0 to 1 in Bernstein form, from its values at 0, 1/3, 2/3 and 1.
 #[inline(always)]
 pub(super) fn bernstein([a, b, c, d]: [f64; 4]) -> [f64; 4] {

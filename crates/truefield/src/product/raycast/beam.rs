@@ -1,10 +1,8 @@
 //! Rays side by side: what they all pass over before any of them can meet something is looked for once.
 
 use super::caster::{Caster, Child};
-use super::walk::{FULL, Prepared};
-
-/// Rays of a beam.
-pub(super) const RAYS: usize = 32;
+use super::lanes::{Lanes, RAYS};
+use super::walk::FULL;
 
 /// Nodes looked at for one beam; then it starts where it has come to.
 const NODES: usize = 512;
@@ -40,21 +38,27 @@ impl Beam {
 impl Caster {
     /// A parameter before which none of the rays meets anything, counted for each from where it enters the domain;
     /// infinite where none ever does. Zero where nothing is gained by asking.
-    pub(super) fn free(&self, rays: &[Option<Prepared>]) -> f64 {
-        let mut met = rays.iter().flatten();
-        let Some(first) = met.next() else { return f64::INFINITY };
-        let alone = |value: [f64; 3]| value.map(|v| [v, v]);
-        let mut beam = Beam { origin: alone(first.turned.origin), inverse: alone(first.turned.inverse), mask: first.turned.mask };
-        for ray in rays.iter().flatten() {
-            if !ray.outside || ray.turned.mask != beam.mask {
-                return 0.0;
-            }
-            let widen = |range: &mut [f64; 2], value: f64| *range = [range[0].min(value), range[1].max(value)];
-            for axis in 0..3 {
-                widen(&mut beam.origin[axis], ray.turned.origin[axis]);
-                widen(&mut beam.inverse[axis], ray.turned.inverse[axis]);
-            }
+    pub(super) fn free(&self, rays: &Lanes<RAYS>) -> f64 {
+        let Some(first) = (0..RAYS).find(|&lane| rays.meets(lane)) else { return f64::INFINITY };
+        let mask = rays.mask[first];
+        let together = |lane: usize| !rays.meets(lane) | (rays.outside(lane) & (rays.mask[lane] == mask));
+        if !(0..RAYS).fold(true, |all, lane| all & together(lane)) {
+            return 0.0;
         }
+        let range = |values: &[f64; RAYS]| {
+            let (mut low, mut high) = (values[first], values[first]);
+            for lane in 0..RAYS {
+                let value = if rays.meets(lane) { values[lane] } else { values[first] };
+                low = if value < low { value } else { low };
+                high = if value > high { value } else { high };
+            }
+            [low, high]
+        };
+        let beam = Beam {
+            origin: std::array::from_fn(|axis| range(&rays.origin[axis])),
+            inverse: std::array::from_fn(|axis| range(&rays.inverse[axis])),
+            mask: mask as usize,
+        };
         self.search(&beam)
     }
 

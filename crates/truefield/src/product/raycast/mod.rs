@@ -7,11 +7,14 @@
 mod along;
 mod beam;
 mod caster;
+mod lanes;
 mod walk;
 
-use beam::RAYS;
+use std::sync::{Mutex, PoisonError};
+
 pub use caster::Caster;
-pub use walk::Hit;
+use lanes::{Lanes, RAYS, take_rays};
+pub use walk::{Hit, Hits};
 
 use crate::error::{Error, Result};
 use crate::geom::DVec3;
@@ -31,37 +34,42 @@ pub enum Method {
 
 impl Caster {
     /// The first hit of each ray; directions need not be of unit length. Entering and leaving both count.
-    ///
-    /// Where nothing is met, the distance is infinite, and place and normal are not numbers.
-    pub fn cast(&self, origins: &[DVec3], directions: &[DVec3], method: Method, run: &Run<'_>) -> Result<Vec<Hit>> {
-        check(origins, directions)?;
-        let mut hits = vec![Hit::NONE; origins.len()];
-        run.chunks("cast rays", &mut hits, CHUNK, |chunk, hits| {
-            for (i, hits) in hits.chunks_mut(RAYS).enumerate() {
-                let rays = chunk * CHUNK + i * RAYS..chunk * CHUNK + i * RAYS + hits.len();
-                self.cast_beam(&origins[rays.clone()], &directions[rays], method, hits);
+    pub fn cast(&self, origins: &[DVec3], directions: &[DVec3], method: Method, run: &Run<'_>) -> Result<Hits> {
+        same_length(origins, directions)?;
+        // Zeros cost nothing until the workers write over them.
+        let count = origins.len();
+        let mut hits = Hits { distances: vec![0.0; count], points: vec![[0.0; 3]; count], normals: vec![[0.0; 3]; count] };
+        let columns = hits.points.chunks_mut(CHUNK).zip(hits.normals.chunks_mut(CHUNK));
+        let parts: Vec<_> = hits.distances.chunks_mut(CHUNK).zip(columns).map(Mutex::new).collect();
+        run.blocks("cast rays", parts.len(), |chunk| {
+            let mut part = parts[chunk].lock().unwrap_or_else(PoisonError::into_inner);
+            let (distances, (points, normals)) = &mut *part;
+            let range = chunk * CHUNK..chunk * CHUNK + distances.len();
+            let (from, along) = (&origins[range.clone()], &directions[range]);
+            let (mut lanes, mut beam) = (Lanes::EMPTY, [Hit::NONE; RAYS]);
+            for first in (0..from.len()).step_by(RAYS) {
+                let rays = first..(first + RAYS).min(from.len());
+                take_rays(&mut lanes, &self.extent, self.scale, &from[rays.clone()], &along[rays.clone()]);
+                if !lanes.are_sound() {
+                    return Err(fault(origins, directions));
+                }
+                self.cast_beam(&lanes, method, &mut beam[..rays.len()]);
+                for (i, hit) in rays.zip(&beam) {
+                    (distances[i], points[i], normals[i]) = (hit.distance, hit.point.to_array(), hit.normal.to_array());
+                }
             }
             Ok(())
         })?;
+        drop(parts);
         Ok(hits)
     }
 
-    /// Up to [`RAYS`] rays; quicker together where they run side by side.
-    fn cast_beam(&self, origins: &[DVec3], directions: &[DVec3], method: Method, hits: &mut [Hit]) {
-        let mut units = [DVec3::ZERO; RAYS];
-        let mut rays = [const { None }; RAYS];
-        for (i, (&origin, &direction)) in origins.iter().zip(directions).enumerate() {
-            units[i] = unit(direction);
-            rays[i] = self.prepare(origin, units[i], f64::INFINITY);
-        }
-        let free = self.free(&rays[..origins.len()]);
-        if free == f64::INFINITY {
-            return;
-        }
-        for ((hit, ray), &direction) in hits.iter_mut().zip(&rays).zip(&units) {
-            if let Some(ray) = ray {
-                *hit = self.follow(ray, free, direction, f64::INFINITY, method).unwrap_or(Hit::NONE);
-            }
+    /// Rays that are quicker together where they run side by side.
+    fn cast_beam(&self, rays: &Lanes<RAYS>, method: Method, hits: &mut [Hit]) {
+        let free = self.free(rays);
+        for (lane, hit) in hits.iter_mut().enumerate() {
+            let ray = if free < f64::INFINITY { rays.ray(lane) } else { None };
+            *hit = ray.and_then(|ray| self.follow(&ray, free, f64::INFINITY, method)).unwrap_or(Hit::NONE);
         }
     }
 
@@ -70,12 +78,16 @@ impl Caster {
         if !(length >= 0.0) {
             return Err(Error::invalid(format!("the length of the rays is {length}; give a length, not negative")));
         }
-        check(origins, directions)?;
+        same_length(origins, directions)?;
         let mut out = vec![false; origins.len()];
         run.chunks("cast rays", &mut out, CHUNK, |chunk, out| {
-            for (i, out) in out.iter_mut().enumerate() {
-                let ray = chunk * CHUNK + i;
-                *out = self.meets(origins[ray], unit(directions[ray]), length, method);
+            let range = chunk * CHUNK..chunk * CHUNK + out.len();
+            let (from, along) = (&origins[range.clone()], &directions[range]);
+            for (out, (&origin, &direction)) in out.iter_mut().zip(from.iter().zip(along)) {
+                if !sound(origin, direction) {
+                    return Err(fault(origins, directions));
+                }
+                *out = self.meets(origin, direction, length, method);
             }
             Ok(())
         })?;
@@ -83,23 +95,23 @@ impl Caster {
     }
 }
 
-/// Of any length that is a number, however small or large.
-fn unit(direction: DVec3) -> DVec3 {
-    let largest = direction.abs().max_element();
-    (direction / largest).normalize()
+fn same_length(origins: &[DVec3], directions: &[DVec3]) -> Result<()> {
+    if origins.len() == directions.len() {
+        return Ok(());
+    }
+    Err(Error::invalid(format!("{} origins need as many directions, not {}", origins.len(), directions.len())))
 }
 
-fn check(origins: &[DVec3], directions: &[DVec3]) -> Result<()> {
-    if origins.len() != directions.len() {
-        return Err(Error::invalid(format!("{} origins need as many directions, not {}", origins.len(), directions.len())));
-    }
+/// Whether both are finite, and the direction is not zero.
+fn sound(origin: DVec3, direction: DVec3) -> bool {
+    origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO
+}
+
+/// What is wrong with the first that is no ray.
+fn fault(origins: &[DVec3], directions: &[DVec3]) -> Error {
     if let Some(ray) = origins.iter().position(|p| !p.is_finite()) {
-        return Err(Error::invalid(format!("the origin of ray {ray} is {}; all origins must be finite numbers", origins[ray])));
+        return Error::invalid(format!("the origin of ray {ray} is {}; all origins must be finite numbers", origins[ray]));
     }
-    match directions.iter().position(|d| !(d.is_finite() && *d != DVec3::ZERO)) {
-        Some(ray) => {
-            Err(Error::invalid(format!("the direction of ray {ray} is {}; give a direction, finite and not zero", directions[ray])))
-        }
-        None => Ok(()),
-    }
+    let ray = directions.iter().position(|d| !(d.is_finite() && *d != DVec3::ZERO)).unwrap_or(0);
+    Error::invalid(format!("the direction of ray {ray} is {}; give a direction, finite and not zero", directions[ray]))
 }

@@ -5,16 +5,15 @@
 //! tree is always computed in one way, so that one cell ends where the next begins.
 
 use super::Method;
-use super::along::{bernstein, first_change, first_root, trilinear};
+use super::along::{bernstein, first_change, first_root, trilinear, trilinear_slopes};
 use super::caster::{Caster, Child};
+use super::lanes::{Lanes, Ray};
 use crate::field::adaptive::MAX_DEPTH;
 use crate::geom::DVec3;
+use crate::simd::{Fuse, multiversion};
 
 /// Edge of the root in units of the finest cells.
 pub(super) const FULL: u32 = 1 << MAX_DEPTH;
-
-/// Stands for the reciprocal of zero.
-const STEEP: f64 = 1e100;
 
 /// A tricubic interpolation of a distance may change somewhat faster than the distance.
 const SLOPE: f64 = 1.5;
@@ -33,6 +32,24 @@ pub struct Hit {
 impl Hit {
     /// No hit.
     pub const NONE: Self = Self { distance: f64::INFINITY, point: DVec3::NAN, normal: DVec3::NAN };
+}
+
+/// What rays meet, one entry for each; as [`Hit::NONE`] where that is nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Hits {
+    /// Distances from the origins, model units.
+    pub distances: Vec<f64>,
+    /// The places, x, y, z.
+    pub points: Vec<[f64; 3]>,
+    /// Unit gradients of the field there: outward.
+    pub normals: Vec<[f64; 3]>,
+}
+
+impl Hits {
+    /// What one of the rays meets.
+    pub fn get(&self, ray: usize) -> Hit {
+        Hit { distance: self.distances[ray], point: DVec3::from_array(self.points[ray]), normal: DVec3::from_array(self.normals[ray]) }
+    }
 }
 
 /// A place where the side changes, in the frame of the walk.
@@ -57,117 +74,58 @@ enum At {
     },
 }
 
-/// A ray that meets the domain.
-pub(super) struct Prepared {
-    pub turned: Turned,
-    /// Whether it comes from outside the domain.
-    pub outside: bool,
-    /// Where it enters the domain, or its origin.
-    start: DVec3,
-    /// How far from the origin that is.
-    begin: f64,
+multiversion!(
+    /// Where the ray first changes sides, from `from` on.
+    fn find(caster: &Caster, ray: &Ray, from: f64, length: f64, method: Method) -> Option<Found> = find_body
+);
+
+#[inline(always)]
+fn find_body<F: Fuse>(caster: &Caster, ray: &Ray, from: f64, length: f64, method: Method) -> Option<Found> {
+    let left = length - ray.begin;
+    let found = match (caster.columns, method) {
+        (false, Method::Linear) => caster.walk::<3, false>(ray, from, left),
+        (false, Method::Cubic) => caster.walk::<3, true>(ray, from, left),
+        (true, Method::Linear) => caster.walk::<2, false>(ray, from, left),
+        (true, Method::Cubic) => caster.walk::<2, true>(ray, from, left),
+    };
+    found.filter(|found| ray.begin + found.t <= length)
 }
 
-/// A ray in units of the finest cells, turned towards high coordinates.
-pub(super) struct Turned {
-    pub origin: [f64; 3],
-    direction: [f64; 3],
-    pub inverse: [f64; 3],
-    /// Axes that were turned, a bit each.
-    pub mask: usize,
-}
-
-impl Turned {
-    /// Parameter at which the ray meets a plane across an axis.
-    #[inline(always)]
-    fn at_plane(&self, axis: usize, plane: f64) -> f64 {
-        (plane - self.origin[axis]) * self.inverse[axis]
-    }
-
-    /// Coordinates from 0 to 1 in a cell, turned back.
-    #[inline(always)]
-    fn local(&self, t: f64, place: [u32; 3], shrink: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|axis| {
-            let at = (self.origin[axis] + self.direction[axis] * t - f64::from(place[axis])) * shrink[axis];
-            let at = at.clamp(0.0, 1.0);
-            if self.mask >> axis & 1 == 1 { 1.0 - at } else { at }
-        })
-    }
+/// Of a power of two, exactly.
+#[inline(always)]
+fn reciprocal(power: u32) -> f64 {
+    f64::from_bits(u64::from(1023 - power.trailing_zeros()) << 52)
 }
 
 impl Caster {
-    /// The first place within `length` at which the ray, of unit direction, changes sides.
+    /// The first place within `length` at which the ray changes sides; its direction need not be of unit length, but not zero.
     ///
     /// A ray starts on the side of its origin, outside of the domain on the outside, and ends there where it leaves.
     pub fn first(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> Option<Hit> {
-        self.follow(&self.prepare(origin, direction, length)?, 0.0, direction, length, method)
+        self.follow(&self.one(origin, direction, length)?, 0.0, length, method)
     }
 
     /// The same of a ray that is prepared, and known to meet nothing before `from`.
-    pub(super) fn follow(&self, ray: &Prepared, from: f64, direction: DVec3, length: f64, method: Method) -> Option<Hit> {
-        let found = self.find(ray, from, length, method)?;
-        let point = ray.start + direction * found.t;
-        Some(Hit { distance: ray.begin + found.t, point, normal: self.normal(&found, point, direction) })
+    pub(super) fn follow(&self, ray: &Ray, from: f64, length: f64, method: Method) -> Option<Hit> {
+        let found = find(self, ray, from, length, method)?;
+        let point = ray.start + ray.unit * found.t;
+        Some(Hit { distance: ray.begin + found.t, point, normal: self.normal(&found, point, ray.unit) })
     }
 
     /// Whether the ray changes sides within `length`.
     pub fn meets(&self, origin: DVec3, direction: DVec3, length: f64, method: Method) -> bool {
-        self.prepare(origin, direction, length).is_some_and(|ray| self.find(&ray, 0.0, length, method).is_some())
+        self.one(origin, direction, length).is_some_and(|ray| find(self, &ray, 0.0, length, method).is_some())
     }
 
-    /// The ray in the frame of the walk; `None` where it does not meet the domain.
-    #[inline]
-    pub(super) fn prepare(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<Prepared> {
-        let (low, high) = (self.extent.min, self.extent.max);
-        let (mut begin, mut end, mut outside) = (0.0, length, false);
-        for axis in 0..3 {
-            let (near, far) = if direction[axis] < 0.0 { (high[axis], low[axis]) } else { (low[axis], high[axis]) };
-            if direction[axis] == 0.0 {
-                if origin[axis] < near || origin[axis] > far {
-                    return None;
-                }
-                continue;
-            }
-            let enter = (near - origin[axis]) / direction[axis];
-            if enter > begin {
-                (begin, outside) = (enter, true);
-            }
-            end = end.min((far - origin[axis]) / direction[axis]);
-        }
-        if !(begin <= end) {
-            return None;
-        }
-        // From there on, so that far origins lose nothing.
-        let start = if outside { origin + direction * begin } else { origin };
-        let mut turned = Turned { origin: [0.0; 3], direction: [0.0; 3], inverse: [0.0; 3], mask: 0 };
-        for axis in 0..3 {
-            let scale = self.scale[axis];
-            let (mut from, mut step) = ((start[axis] - low[axis]) * scale, direction[axis] * scale);
-            if step < 0.0 {
-                (from, step) = (f64::from(FULL) - from, -step);
-                turned.mask |= 1 << axis;
-            }
-            turned.origin[axis] = from.clamp(0.0, f64::from(FULL));
-            turned.direction[axis] = step;
-            turned.inverse[axis] = if step > 1.0 / STEEP { 1.0 / step } else { STEEP };
-        }
-        Some(Prepared { turned, outside, start, begin })
-    }
-
-    fn find(&self, ray: &Prepared, from: f64, length: f64, method: Method) -> Option<Found> {
-        let left = length - ray.begin;
-        let found = match (self.columns, method) {
-            (false, Method::Linear) => self.walk::<3, false>(ray, from, left),
-            (false, Method::Cubic) => self.walk::<3, true>(ray, from, left),
-            (true, Method::Linear) => self.walk::<2, false>(ray, from, left),
-            (true, Method::Cubic) => self.walk::<2, true>(ray, from, left),
-        };
-        found.filter(|found| ray.begin + found.t <= length)
+    fn one(&self, origin: DVec3, direction: DVec3, length: f64) -> Option<Ray> {
+        let mut lane = Lanes::<1>::EMPTY;
+        lane.take(&self.extent, self.scale, &[origin], &[direction], length);
+        lane.ray(0)
     }
 
     /// `AXES` are divided; `CUBIC` solves for the crossing of a trilinear leaf, else the way between its ends is a line.
     #[inline(always)]
-    fn walk<const AXES: usize, const CUBIC: bool>(&self, prepared: &Prepared, from: f64, length: f64) -> Option<Found> {
+    fn walk<const AXES: usize, const CUBIC: bool>(&self, prepared: &Ray, from: f64, length: f64) -> Option<Found> {
         let ray = &prepared.turned;
         let mask = if AXES == 3 { ray.mask } else { ray.mask & 3 };
         let mut stack = [0u32; MAX_DEPTH as usize + 1];
@@ -176,7 +134,7 @@ impl Caster {
         let mut word = self.root;
         let mut t = from;
         // The value at the end of the last cell: infinite where only its side is known, not a number before the first.
-        let mut carried = if prepared.outside { f64::INFINITY } else { f64::NAN };
+        let mut carried = if prepared.outside() { f64::INFINITY } else { f64::NAN };
         let mut last = None;
         loop {
             // Down to the leaf that holds the ray at t.
@@ -195,7 +153,7 @@ impl Caster {
             }
             // Its end.
             let sizes = if AXES == 3 { [size; 3] } else { [size, size, FULL] };
-            let shrink = sizes.map(|size| 1.0 / f64::from(size));
+            let shrink = sizes.map(reciprocal);
             let ends: [f64; 3] = std::array::from_fn(|axis| ray.at_plane(axis, f64::from(place[axis] + sizes[axis])));
             let axis_out = if ends[0] <= ends[1] {
                 if ends[0] <= ends[2] { 0 } else { 2 }
@@ -315,11 +273,6 @@ impl Caster {
             edge[axis] = part * f64::from(size);
             local[axis] = ((point[axis] - self.extent.min[axis] - part * f64::from(low)) / edge[axis]).clamp(0.0, 1.0);
         }
-        let slope = |axis: usize| {
-            let (mut low, mut high) = (local, local);
-            (low[axis], high[axis]) = (0.0, 1.0);
-            (trilinear(corners, high) - trilinear(corners, low)) / edge[axis]
-        };
-        DVec3::new(slope(0), slope(1), slope(2))
+        DVec3::from_array(trilinear_slopes(corners, local)) / edge
     }
 }
