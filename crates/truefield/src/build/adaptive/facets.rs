@@ -131,15 +131,9 @@ impl<'a> Prover<'a> {
             known = known.intersection(differences.widen(0.5 * size.length() * (1.0 + 1e-12)));
         }
         if let Some(side) = at.side {
-            // 1, and 2 for the feet of centre and corners.
             let told = told.map(|v| side.sign() * v);
-            let distances = corners.map(|corner| corner.value.abs());
-            let (least, square) = (ends(&distances).0, spread(&distances, size.x));
-            let below = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
-            let difference = ends(&std::array::from_fn(|j| distances[j] - told[j])).0;
             let feet: [DVec3; 9] = std::array::from_fn(|k| if k < 8 { corners[k].foot } else { at.center.unwrap_or(corners[0].foot) });
-            let above = above_feet(corners, &feet, &told, limit);
-            known = known.intersection(signed(side, Interval { lower: difference - below, upper: above }));
+            known = known.intersection(signed(side, by_corners(corners, &feet, &told, size.x, limit)));
         }
         known.widen(self.slack(&at.cell))
     }
@@ -249,13 +243,22 @@ fn cosine_body<F: Fuse>(planes: &[Plane], list: &[Slot]) -> f64 {
 const ROUNDS: usize = 8;
 
 multiversion!(
-    /// No less than the unsigned distance minus the interpolation of what is told, by points of the surface; no sharper than
-    /// `limit`.
-    fn above_feet(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: f64) -> f64 = above_feet_body
+    /// 1, and 2 for points of the surface: contains the unsigned distance minus the interpolation of what is told in a cell of
+    /// edge `edge`; from above no sharper than `limit`.
+    fn by_corners(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], edge: f64, limit: f64) -> Interval = by_corners_body
 );
 
 #[inline(always)]
-fn above_feet_body<F: Fuse>(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: f64) -> f64 {
+fn by_corners_body<F: Fuse>(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], edge: f64, limit: f64) -> Interval {
+    let distances: [f64; 8] = std::array::from_fn(|j| corners[j].value.abs());
+    let (least, square) = (ends(&distances).0, spread(&distances, edge));
+    let below = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
+    let difference = ends(&std::array::from_fn(|j| distances[j] - told[j])).0;
+    Interval { lower: difference - below, upper: above_feet(corners, feet, told, limit) }
+}
+
+#[inline(always)]
+fn above_feet(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: f64) -> f64 {
     let mut rows = [[0.0; 8]; 9];
     let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].point[axis]) };
     let (xs, ys, zs) = (axis(0), axis(1), axis(2));
@@ -299,24 +302,38 @@ fn between_planes_body<F: Fuse>(planes: &[Plane], list: &[Slot], corners: &[Corn
 /// where it is largest, another row is smallest; of both as much as makes the largest numbers equal.
 #[inline(always)]
 fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
-    let largest = |row: &[f64; 8]| (1..8).fold((0, row[0]), |(at, high), j| if row[j] > high { (j, row[j]) } else { (at, high) });
-    let Some(mut mean) = rows.iter().copied().min_by(|a, b| largest(a).1.total_cmp(&largest(b).1)) else { return f64::INFINITY };
-    let (mut at, mut high) = largest(&mean);
+    let (mut mean, mut high) = ([0.0; 8], f64::INFINITY);
+    for row in rows {
+        let highest = highest(row);
+        if highest < high {
+            (mean, high) = (*row, highest);
+        }
+    }
+    let mut at = place_of(&mean, high);
     for _ in 0..ROUNDS {
         if high <= limit {
             break;
         }
-        let Some(other) = rows.iter().min_by(|a, b| a[at].total_cmp(&b[at])) else { break };
-        let fall = high - other[at];
-        if !(fall > 0.0) {
+        let (mut other, mut low) = (0, f64::INFINITY);
+        for (number, row) in rows.iter().enumerate() {
+            let lower = row[at] < low;
+            (other, low) = if lower { (number, row[at]) } else { (other, low) };
+        }
+        let fall = high - low;
+        if !(fall > 0.0 && fall < f64::INFINITY) {
             break;
         }
-        let mut rival = largest(other).0;
+        let other = &rows[other];
+        let mut rival = place_of(other, highest(other));
         let mut better = None;
         for _ in 0..3 {
             let weight = ((high - mean[rival]) / (fall + other[rival] - mean[rival])).clamp(0.0, 1.0);
-            let mixed: [f64; 8] = std::array::from_fn(|j| mean[j] + weight * (other[j] - mean[j]));
-            let (worst, value) = largest(&mixed);
+            let mut mixed = [0.0; 8];
+            for lane in 0..8 {
+                mixed[lane] = mean[lane] + weight * (other[lane] - mean[lane]);
+            }
+            let value = highest(&mixed);
+            let worst = place_of(&mixed, value);
             if value < high && better.is_none_or(|(_, _, least)| value < least) {
                 better = Some((mixed, worst, value));
             }
@@ -331,10 +348,26 @@ fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
     high
 }
 
+/// The largest of eight numbers, halves at a time.
+#[inline(always)]
+fn highest(row: &[f64; 8]) -> f64 {
+    let more = |a: f64, b: f64| if b > a { b } else { a };
+    let four: [f64; 4] = std::array::from_fn(|j| more(row[j], row[j + 4]));
+    let two: [f64; 2] = std::array::from_fn(|j| more(four[j], four[j + 2]));
+    more(two[0], two[1])
+}
+
+/// The first place of a number in a row.
+#[inline(always)]
+fn place_of(row: &[f64; 8], number: f64) -> usize {
+    (0..8).rev().fold(0, |at, j| if row[j] == number { j } else { at })
+}
+
 /// At least |p|^2 less its interpolation, less what the interpolation of the squared distances is above the square of theirs.
 ///
 /// The latter is a variance, that of the part that is affine, with slopes b, less that of the rest: for coordinates t in a
 /// cell of edge h, sum of (1 - b^2) h^2 t (1 - t) and a rest that is small where the distances are nearly affine.
+#[inline(always)]
 fn spread(distances: &[f64; 8], edge: f64) -> f64 {
     let mean = distances.iter().sum::<f64>() / 8.0;
     let side = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -0.5 } else { 0.5 };
@@ -347,8 +380,9 @@ fn spread(distances: &[f64; 8], edge: f64) -> f64 {
     square.min(0.75 * edge * edge) * (1.0 + 1e-12)
 }
 
+#[inline(always)]
 fn ends(values: &[f64; 8]) -> (f64, f64) {
-    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    (-highest(&values.map(|v| -v)), highest(values))
 }
 
 fn hull(values: [f64; 8]) -> Interval {

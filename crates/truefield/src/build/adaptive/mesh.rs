@@ -372,24 +372,27 @@ impl<'a> Builder<'a> {
             return (false, None);
         }
         let samples = self.job.rules.rule == Rule::Samples;
-        let proof = self.prove_parts(&seen.start, halves, &blended, seen.limit);
-        seen.known = seen.known.intersection(proof.known);
-        if seen.is_within() || list.is_empty() {
-            return (samples || seen.is_within(), None);
+        if !list.is_empty() {
+            // The cheapest look at the list says enough where the surface is smooth.
+            let at = seen.at(Some(halves.corner(CENTER).foot), list);
+            let (mut known, turn) = self.prover.planes(&at, seen.known);
+            if turn < 1.0 && !within(known, seen.limit) {
+                let differences = (0..NODES).map(|number| Interval::exact(halves.corner(number).value - blended[number]));
+                let differences = differences.fold(NOTHING, Interval::hull);
+                known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * seen.cell.size().x, turn));
+            }
+            seen.known = known;
         }
-        let at = seen.at(Some(halves.corner(CENTER).foot), list);
-        let (mut known, turn) = self.prover.planes(&at, seen.known);
-        if !samples && !within(known, seen.limit) {
-            known = self.prover.triangles(&at, known, seen.limit);
-        }
-        if turn < 1.0 && !within(known, seen.limit) {
-            let differences = (0..NODES).map(|number| Interval::exact(halves.corner(number).value - blended[number]));
-            let differences = differences.fold(NOTHING, Interval::hull);
-            known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * seen.cell.size().x, turn));
-        }
-        seen.known = known;
         if seen.is_within() {
             return (true, None);
+        }
+        let proof = self.prove_parts(&seen.start, halves, &blended, seen.limit);
+        seen.known = seen.known.intersection(proof.known);
+        if !samples && !list.is_empty() && !seen.is_within() {
+            seen.known = self.prover.triangles(&seen.at(None, list), seen.known, seen.limit);
+        }
+        if seen.is_within() || list.is_empty() {
+            return (samples || seen.is_within(), None);
         }
         let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
         let parts: [_; OCTANTS] = std::array::from_fn(|octant| {
