@@ -80,7 +80,7 @@ impl Cloud<'_> {
             self.near = self.tree.slots[nearest.triangle as usize];
             let witness = self.tree.facet(nearest.triangle).nearest(part.cell.center()).point;
             let mut list = Vec::new();
-            if gather_few(self.tree, &part.cell, witness, SEARCH * count, &mut self.scratch, &mut list) {
+            if gather_few(self.tree, &part.cell, &[witness], SEARCH * count, &mut self.scratch, &mut list) {
                 // One witness made it; eight make it much shorter.
                 return if list.len() > SHORT { self.share(&[part], &list) } else { self.shorten(part, &list) };
             }

@@ -63,17 +63,24 @@ pub(crate) fn gather(tree: &Tree, cell: &Aabb, near: Slot, window: Range, scratc
     out.clear();
     if range.meets(window) {
         let witness = tree.facet(first.triangle).nearest(cell.center()).point;
-        collect(tree, cell, witness, usize::MAX, &mut scratch.stack, out);
+        collect(tree, cell, &[witness], usize::MAX, &mut scratch.stack, out);
         out.sort_unstable();
     }
     range
 }
 
-/// The complete list of `cell` in `out`, in the order of a walk, of which `witness` is a point of the surface nearby; false, and no list, where
-/// about `most` triangles cannot be ruled out at once.
-pub(crate) fn gather_few(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, scratch: &mut Scratch, out: &mut Vec<Slot>) -> bool {
+/// The complete list of `cell` in `out`, in the order of a walk; false, and no list, where about `most` triangles cannot be
+/// ruled out at once by `witnesses`, points of the surface nearby.
+pub(crate) fn gather_few(
+    tree: &Tree,
+    cell: &Aabb,
+    witnesses: &[DVec3],
+    most: usize,
+    scratch: &mut Scratch,
+    out: &mut Vec<Slot>,
+) -> bool {
     out.clear();
-    collect(tree, cell, witness, most, &mut scratch.stack, out);
+    collect(tree, cell, witnesses, most, &mut scratch.stack, out);
     if out.len() > most {
         out.clear();
         return false;
@@ -94,7 +101,7 @@ multiversion!(
 );
 
 multiversion!(
-    fn collect(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, stack: &mut Vec<u32>, out: &mut Vec<Slot>) = collect_body
+    fn collect(tree: &Tree, cell: &Aabb, witnesses: &[DVec3], most: usize, stack: &mut Vec<u32>, out: &mut Vec<Slot>) = collect_body
 );
 
 /// How far single-precision distances from points of `cell` may be off.
@@ -102,10 +109,10 @@ pub(crate) fn filter_error(tree: &Tree, cell: &Aabb) -> f64 {
     FILTER_ERROR * ((cell.center() - tree.center).length() + cell.radius() + 2.0 * tree.radius)
 }
 
-/// Descends into every node that the witness does not rule out for the whole cell; gives up beyond `most` triangles.
+/// Descends into every node that no witness rules out for the whole cell; gives up beyond `most` triangles.
 #[inline(always)]
-fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, stack: &mut Vec<u32>, out: &mut Vec<Slot>) {
-    let (low, high, q) = (cell.min - tree.center, cell.max - tree.center, witness - tree.center);
+fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witnesses: &[DVec3], most: usize, stack: &mut Vec<u32>, out: &mut Vec<Slot>) {
+    let (low, high) = (cell.min - tree.center, cell.max - tree.center);
     let size = low.abs().max(high.abs()).max_element() + tree.radius;
     // Rounding of sums of squares of coordinates up to `size`.
     let slack = 64.0 * f64::EPSILON * size * size;
@@ -116,17 +123,29 @@ fn collect_body<F: Fuse>(tree: &Tree, cell: &Aabb, witness: DVec3, most: usize, 
             return;
         }
         let node = &tree.nodes[index as usize];
-        let mut least = [0.0f64; WIDTH];
+        // Squared distances of the ends of the cell to the boxes, axis by axis.
+        let mut gaps = [[[0.0f64; WIDTH]; 2]; 3];
         for axis in 0..3 {
-            let (low, high, q) = (low[axis], high[axis], q[axis]);
-            for lane in 0..WIDTH {
-                let (min, max) = (f64::from(node.min[axis][lane]), f64::from(node.max[axis][lane]));
-                // Squared distance to the box less squared distance to the witness: concave along the axis.
-                let at = |p: f64| {
+            for (p, gaps) in [low[axis], high[axis]].into_iter().zip(&mut gaps[axis]) {
+                for lane in 0..WIDTH {
+                    let (min, max) = (f64::from(node.min[axis][lane]), f64::from(node.max[axis][lane]));
                     let gap = (min - p).max(p - max).max(0.0);
-                    gap * gap - (p - q) * (p - q)
+                    gaps[lane] = gap * gap;
+                }
+            }
+        }
+        // The squared distance to a box less that to a witness is concave along each axis, so least at an end.
+        let mut least = [f64::NEG_INFINITY; WIDTH];
+        for witness in witnesses {
+            let q = *witness - tree.center;
+            let (near, far) = ((low - q) * (low - q), (high - q) * (high - q));
+            for lane in 0..WIDTH {
+                let along = |axis: usize| {
+                    let (near, far) = (gaps[axis][0][lane] - near[axis], gaps[axis][1][lane] - far[axis]);
+                    if near < far { near } else { far }
                 };
-                least[lane] += at(low).min(at(high));
+                let sum = along(0) + along(1) + along(2);
+                least[lane] = if sum > least[lane] { sum } else { least[lane] };
             }
         }
         for lane in 0..WIDTH {

@@ -18,7 +18,6 @@ use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::grid::Grid;
 use crate::run::Run;
-use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
 /// Depth of the cells that workers take; no leaf is coarser.
@@ -326,7 +325,8 @@ impl<'a> Builder<'a> {
 
     /// The complete list of a cell, of no more than about `most` triangles.
     fn gather(&mut self, seen: &Seen<'_>, most: usize, list: &mut Vec<Slot>) -> bool {
-        gather_few(self.job.surface.tree(), &seen.cell, witness(seen.corners), most, &mut self.scratch, list)
+        let feet = seen.corners.map(|corner| corner.foot);
+        gather_few(self.job.surface.tree(), &seen.cell, &feet, most, &mut self.scratch, list)
     }
 
     /// Judges a cell by the corners of its parts, and divides it where that is not enough.
@@ -598,27 +598,6 @@ fn found(surface: &Surface, p: DVec3, nearest: Candidate, side: Option<Side>) ->
 /// A number for each lattice point.
 fn key(place: [i64; 3]) -> u64 {
     place.iter().fold(0, |key, &i| key << 21 | i as u64)
-}
-
-multiversion!(
-    /// The one of the corners' nearest points whose greatest distance from the corners is least.
-    fn witness(corners: &[Corner; 8]) -> DVec3 = witness_body
-);
-
-#[inline(always)]
-fn witness_body<F: Fuse>(corners: &[Corner; 8]) -> DVec3 {
-    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].foot[axis]) };
-    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-    let mut reach = [0.0; 8];
-    for Corner { point, .. } in corners {
-        for lane in 0..8 {
-            let (x, y, z) = (xs[lane] - point.x, ys[lane] - point.y, zs[lane] - point.z);
-            let squared = x * x + y * y + z * z;
-            reach[lane] = if squared > reach[lane] { squared } else { reach[lane] };
-        }
-    }
-    let best = (1..8).fold(0, |best, j| if reach[j] < reach[best] { j } else { best });
-    corners[best].foot
 }
 
 /// The one side of a cell that the surface does not touch, where the side changes at the surface only.
