@@ -71,14 +71,7 @@ pub(crate) fn gather(tree: &Tree, cell: &Aabb, near: Slot, window: Range, scratc
 
 /// The complete list of `cell` in `out`, in the order of a walk; false, and no list, where about `most` triangles cannot be
 /// ruled out at once by `witnesses`, points of the surface nearby.
-pub(crate) fn gather_few(
-    tree: &Tree,
-    cell: &Aabb,
-    witnesses: &[DVec3],
-    most: usize,
-    scratch: &mut Scratch,
-    out: &mut Vec<Slot>,
-) -> bool {
+pub(crate) fn gather_few(tree: &Tree, cell: &Aabb, witnesses: &[DVec3], most: usize, scratch: &mut Scratch, out: &mut Vec<Slot>) -> bool {
     out.clear();
     collect(tree, cell, witnesses, most, &mut scratch.stack, out);
     if out.len() > most {

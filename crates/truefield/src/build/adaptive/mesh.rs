@@ -36,7 +36,7 @@ const LONGEST: usize = 64;
 const LISTED: usize = 128;
 
 /// Those of a cell that may be divided; its corners' nearest points shorten the list.
-const MOST: usize = 512;
+const MOST: usize = 1024;
 
 /// Exact leaves this many times their half diagonal away are not divided for the sake of their lists, which are as long in
 /// the parts.
