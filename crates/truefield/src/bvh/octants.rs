@@ -156,7 +156,7 @@ fn reaches(octants: &Octants, lanes: &[[u8; CORNERS]; 2], feet: &[[DVec3; CORNER
     });
     let mut reach = [[0.0f32; LANES]; CORNERS];
     for (witness, reach) in reach.iter_mut().enumerate() {
-        let q = feet.map(|feet| feet[witness] - octants.base);
+        let q = [feet[0][witness] - octants.base, feet[1][witness] - octants.base];
         for lane in 0..LANES {
             let q = q[lane / CORNERS];
             let (x, y, z) = (offsets.x[lane] - q.x as f32, offsets.y[lane] - q.y as f32, offsets.z[lane] - q.z as f32);
@@ -237,10 +237,14 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
 
 #[inline(always)]
 fn split_body<F: Fuse>(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
-    let lanes = pair.map(|octant| PICK[octant]);
-    let reach = reaches(octants, &lanes, &lanes.map(|lanes| lanes.map(|lane| feet[usize::from(NODE[usize::from(lane)])])));
-    let [first, second] = pair.map(|octant| std::mem::take(&mut out[octant]));
-    let (mut left, mut right) = (first, second);
+    let lanes = [PICK[pair[0]], PICK[pair[1]]];
+    let mut around = [[DVec3::ZERO; CORNERS]; 2];
+    for lane in 0..LANES {
+        around[lane / CORNERS][lane % CORNERS] = feet[node(pair[lane / CORNERS], lane % CORNERS)];
+    }
+    let reach = reaches(octants, &lanes, &around);
+    let mut left = std::mem::take(&mut out[pair[0]]);
+    let mut right = std::mem::take(&mut out[pair[1]]);
     let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane / CORNERS][lane % CORNERS]));
     for (&slot, row) in list.iter().zip(&octants.rows) {
         let (low, high) = stays::<F>(&F::pick(row, &lanes), &reach);

@@ -1,4 +1,5 @@
-//! Trees of meshes: a cell is proven by its corners, its nearest points and, where they are few, its triangles.
+//! Trees of meshes: a cell is proven by its corners, its nearest points and, where they are few, its triangles. From a
+//! cell's complete list the corners of all its parts are answered at once, and the parts' lists made of it.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
