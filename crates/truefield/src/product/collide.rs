@@ -26,7 +26,7 @@ const LEAST: usize = 4096;
 const SURE: usize = 2048;
 
 /// Boxes that are larger than what is open by this may tell more when they are divided; such that are smaller by this not.
-pub(super) const COARSE: f64 = 2.0;
+pub(super) const COARSE: f64 = 1.0;
 pub(super) const FINE: f64 = 0.25;
 
 /// What division has to raise a bound by, of what is open.

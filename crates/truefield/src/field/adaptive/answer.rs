@@ -1,5 +1,7 @@
 //! What a field answers as a [`Distance`], inside its domain and outside.
 
+use glam::BVec3;
+
 use super::beyond::{Target, nearest_listed};
 use super::model::Model;
 use super::page::ListSide;
@@ -138,14 +140,20 @@ impl AdaptiveField {
     /// Calls `visit` with cells that cover a box, and their parts of it; none is much finer than the box.
     fn each_in<'a>(&'a self, cell: &Aabb, mut visit: impl FnMut(Cell<'a>, &Aabb)) {
         let fine = FINE * cell.size().max_element();
+        // Those that only touch the box know nothing of it that others do not, where no side jumps between them.
+        let thick = match self.continuity {
+            Continuity::Everywhere => cell.size().cmpgt(DVec3::ZERO),
+            Continuity::ExceptOpenings => BVec3::FALSE,
+        };
         self.walk(&mut |at| {
             let extent = at.extent();
-            if !extent.overlaps(cell) {
+            let part = Aabb::new(cell.min.max(extent.min), cell.max.min(extent.max));
+            if part.min.cmpgt(part.max).any() || (part.min.cmpeq(part.max) & thick).any() {
                 return false;
             }
             let coarse = !at.is_leaf() && extent.size().x > fine;
             if !coarse {
-                visit(at, &Aabb::new(cell.min.max(extent.min), cell.max.min(extent.max)));
+                visit(at, &part);
             }
             coarse
         });

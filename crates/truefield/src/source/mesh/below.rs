@@ -5,7 +5,7 @@
 //! in B. Outside, the distance is |p - x| >= n . (p - x) >= n . p - h.
 //!
 //! B beyond the plane n . x = h holds no surface: where the side changes at the surface only it has one side, and one point
-//! tells that it is outside. Then p inside is not beyond the plane, and the way from it along n to the plane, h - n . p
+//! tells that it is outside, c itself where the ball around it that touches the surface sticks out of the plane. Then p inside is not beyond the plane, and the way from it along n to the plane, h - n . p
 //! long, ends outside or leaves B, and so is no shorter than the way to the surface: the distance is no less than
 //! n . p - h again. Where vertices were joined, sides are open in a layer around the surface, by which all ways may be off.
 
@@ -65,7 +65,7 @@ impl Surface {
             }
             _ => {
                 height >= ball.radius
-                    || side == Side::Outside && height < -slip
+                    || side == Side::Outside && height < way - slip
                     || self.is_outside(center + normal * (0.5 * (height + ball.radius)))
             }
         };
