@@ -29,6 +29,9 @@ pub(super) struct Gap {
 impl Piece {
     /// `None` where the box holds nothing of the solid.
     pub fn of(solid: &dyn Distance, extent: &Aabb) -> Option<Self> {
+        if solid.over(extent).lower > 0.0 {
+            return None;
+        }
         let (near, center, half) = (solid.below(extent), extent.center(), 0.5 * extent.size());
         if near.slope == DVec3::ZERO || !near.value.is_finite() {
             return (near.value <= 0.0).then_some(Self { hull: *extent, plane: Affine::constant(0.0) });
@@ -36,7 +39,7 @@ impl Piece {
         let reach = near.slope.abs() * half;
         let all = reach.element_sum();
         let slip = 1e-14 * (near.value.abs() + all);
-        if near.value - all > slip || solid.over(extent).lower > 0.0 {
+        if near.value - all > slip {
             return None;
         }
         let mut hull = *extent;
