@@ -20,11 +20,15 @@ use crate::source::waiting::Waiting;
 /// Pairs that are divided at a time: the result depends on it, and not on the number of threads.
 const BATCH: usize = 64;
 
-/// Of those, how many are asked for a way.
+/// Of those, how many are asked for a way, and how many are in the end.
 const TRIED: usize = 4;
+const LAST: usize = 256;
 
 /// Steps that lead from a point to the surface of a solid without slopes.
 const STEPS: usize = 3;
+
+/// Boxes that a worker divides at a time: a few are not worth another thread.
+const CHUNK: usize = 8;
 
 /// Pairs for each box of the budget.
 const PAIRS: usize = 8;
@@ -101,7 +105,13 @@ pub(super) fn clearance(
         run.progress.report("search for the shortest way", known.boxes.min(budget), budget);
         let gap = known.upper - known.lower;
         let told = gap <= tolerance && (known.lower > 0.0 || known.upper <= 0.0 || pairs >= CLOSE);
-        let in_doubt = pairs >= SURE && heap.peek().is_some_and(|first| in_doubt(&solids, first, gap));
+        let in_doubt = !told && pairs >= SURE && heap.peek().is_some_and(|first| in_doubt(&solids, first, gap));
+        if in_doubt {
+            // What is left is the doubt of solids, which is not the same everywhere.
+            for pair in heap.iter().take(LAST) {
+                known.offer([f, g], ends_of(&solids, pair.item.nodes), step);
+            }
+        }
         // Nothing is left where a solid is empty.
         if heap.is_empty() || told || in_doubt || known.boxes >= budget || pairs / PAIRS >= budget || patience.ends(pairs, gap) {
             return Ok(known);
@@ -275,11 +285,15 @@ impl<'a> Solid<'a> {
         let mut whole: Vec<usize> = wanted.filter(|&node| self.nodes[node].parts.is_none()).collect();
         whole.sort_unstable();
         whole.dedup();
-        let found = run.blocks("search for the shortest way", whole.len(), |block| {
-            let parts = octants(&self.nodes[whole[block]].extent).into_iter().flatten();
-            Ok(parts.filter_map(|extent| self.node(&extent, enough)).collect::<Vec<_>>())
+        let found = run.blocks("search for the shortest way", whole.len().div_ceil(CHUNK), |block| {
+            let chunk = &whole[CHUNK * block..(CHUNK * (block + 1)).min(whole.len())];
+            let parts = |&node: &usize| {
+                let parts = octants(&self.nodes[node].extent).into_iter().flatten();
+                parts.filter_map(|extent| self.node(&extent, enough)).collect::<Vec<_>>()
+            };
+            Ok(chunk.iter().map(parts).collect::<Vec<_>>())
         })?;
-        for (&node, parts) in whole.iter().zip(found) {
+        for (&node, parts) in whole.iter().zip(found.into_iter().flatten()) {
             let first = self.nodes.len();
             self.nodes.extend(parts);
             self.nodes[node].parts = Some(first..self.nodes.len());
