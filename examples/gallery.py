@@ -150,6 +150,6 @@ def main(path: Path, only: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2:
+    if len(sys.argv) < 2 or Path(sys.argv[1]).suffix != ".png":
         sys.exit("usage: python examples/gallery.py PICTURE.png [words of the pictures wanted]")
     main(Path(sys.argv[1]), sys.argv[2:])

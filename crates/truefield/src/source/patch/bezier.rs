@@ -77,7 +77,7 @@ impl Bezier {
     }
 
     /// All control points.
-    pub(super) fn controls(&self) -> impl Iterator<Item = DVec3> + '_ {
+    pub(super) fn controls(&self) -> impl Iterator<Item = DVec3> + Clone + '_ {
         self.0.iter().flatten().copied()
     }
 

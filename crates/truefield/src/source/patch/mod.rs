@@ -1,6 +1,7 @@
 //! Surfaces of bicubic Bezier patches: the closest point, with proof.
 
 mod bezier;
+mod oriented;
 mod piece;
 mod surface;
 

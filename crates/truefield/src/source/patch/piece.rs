@@ -1,6 +1,7 @@
 //! A part of a patch, and how near it is for certain.
 
 use super::bezier::{Bezier, Point};
+use super::oriented::Oriented;
 use crate::geom::{Aabb, DVec3, Interval};
 
 /// Newton steps towards the nearest point of a piece.
@@ -29,6 +30,12 @@ impl Piece {
 
     pub(super) fn extent(&self) -> &Aabb {
         &self.hulls[0]
+    }
+
+    /// A box along it.
+    pub(super) fn oriented(&self) -> Oriented {
+        let middle = self.bezier.derivatives(0.5, 0.5);
+        Oriented::around(self.bezier.controls(), [middle.u, middle.v])
     }
 
     /// Cut across the direction in which it is longer.

@@ -4,6 +4,7 @@ use std::collections::{BinaryHeap, HashMap};
 use std::sync::Arc;
 
 use super::bezier::Bezier;
+use super::oriented::Oriented;
 use super::piece::Piece;
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
@@ -57,7 +58,7 @@ pub struct Patches {
 #[derive(Debug)]
 enum Node {
     Inner { extent: Aabb, children: [u32; 2] },
-    Leaf(Box<Piece>),
+    Leaf(Box<(Piece, Oriented)>),
 }
 
 /// Triangles next to the patches.
@@ -116,7 +117,7 @@ impl Patches {
         let (mut floor, mut upper, mut point) = (f64::INFINITY, f64::INFINITY, DVec3::NAN);
         let count = self.nodes.len() as u32;
         let mut entered = 0;
-        // Items are nodes or, from the number of nodes on, pieces of the search.
+        // Items are nodes, then leaves whose own boxes were asked, then pieces of the search.
         let mut enter = |heap: &mut BinaryHeap<Waiting<u32>>, extent: &Aabb, least: f64, item: u32| {
             entered += 1;
             heap.push(Waiting { bound: (extent.distance_squared(p) * (1.0 - 8.0 * f64::EPSILON)).max(least), number: entered, item });
@@ -127,18 +128,26 @@ impl Patches {
                 floor = floor.min(bound);
                 break;
             }
-            let piece = if place < count {
-                match &self.nodes[place as usize] {
+            let piece = if place < 2 * count {
+                match &self.nodes[(place % count) as usize] {
                     Node::Inner { children, .. } => {
                         for &child in children {
                             enter(&mut heap, extent_of(&self.nodes[child as usize]), bound, child);
                         }
                         continue;
                     }
-                    Node::Leaf(piece) => (**piece).clone(),
+                    Node::Leaf(leaf) => {
+                        let (piece, oriented) = &**leaf;
+                        let least = oriented.distance(p).max(0.0).powi(2) * (1.0 - 8.0 * f64::EPSILON);
+                        if place < count && least > bound {
+                            enter(&mut heap, piece.extent(), least, place + count);
+                            continue;
+                        }
+                        piece
+                    }
                 }
             } else {
-                pieces[(place - count) as usize].clone()
+                &pieces[(place - 2 * count) as usize]
             };
             let nearest = piece.nearest(p);
             let far = (nearest.point - p).length();
@@ -150,7 +159,7 @@ impl Patches {
                 continue;
             }
             for half in piece.halves() {
-                enter(&mut heap, half.extent(), nearest.lower.max(bound), count + pieces.len() as u32);
+                enter(&mut heap, half.extent(), nearest.lower.max(bound), 2 * count + pieces.len() as u32);
                 pieces.push(half);
             }
         }
@@ -169,7 +178,7 @@ impl Patches {
             match &self.nodes[index] {
                 node if !near(extent_of(node)) => {}
                 Node::Inner { children, .. } => pending.extend(children.iter().map(|&child| child as usize)),
-                Node::Leaf(piece) => halves.push(((**piece).clone(), FINER)),
+                Node::Leaf(leaf) => halves.push((leaf.0.clone(), FINER)),
             }
             while let Some((piece, levels)) = halves.pop() {
                 if !near(piece.extent()) || piece.is_simple(cell) {
@@ -289,14 +298,15 @@ impl Weld {
 fn extent_of(node: &Node) -> &Aabb {
     match node {
         Node::Inner { extent, .. } => extent,
-        Node::Leaf(piece) => piece.extent(),
+        Node::Leaf(leaf) => leaf.0.extent(),
     }
 }
 
 /// Adds a piece and its halves; its number.
 fn grow(nodes: &mut Vec<Node>, piece: Piece, levels: u32) -> u32 {
     if levels == 0 {
-        nodes.push(Node::Leaf(Box::new(piece)));
+        let oriented = piece.oriented();
+        nodes.push(Node::Leaf(Box::new((piece, oriented))));
     } else {
         let children = piece.halves().map(|half| grow(nodes, half, levels - 1));
         nodes.push(Node::Inner { extent: around(nodes, children), children });
