@@ -51,8 +51,11 @@ impl Sum {
 
     /// [`Winding::refine`]; nothing is known where the winding numbers cannot be had.
     fn refine(&self, p: DVec3, enough: impl Fn(Estimate) -> bool) -> Estimate {
-        let unknown = Estimate { value: 0.0, error: f64::INFINITY, doubt: f64::INFINITY };
-        self.winding(&Run::default()).map_or(unknown, |winding| winding.refine(p, enough))
+        // A default run asks the system how many threads there are, which takes longer than all else here.
+        match self.winding.get().map_or_else(|| self.winding(&Run::default()), Ok) {
+            Ok(winding) => winding.refine(p, enough),
+            Err(_) => Estimate { value: 0.0, error: f64::INFINITY, doubt: f64::INFINITY },
+        }
     }
 
     pub fn side(&self, p: DVec3) -> Side {
