@@ -207,6 +207,38 @@ fn primitives_are_exact() {
     }
 }
 
+/// Boxes around places where slopes are lost: middles, axes, rings.
+#[test]
+fn no_plane_rises_above_a_shape_from_where_its_slope_is_lost() {
+    let mut random = Random::new(23);
+    let mut shapes = primitives();
+    for _ in 0..300 {
+        let [a, b] = [random.direction() * random.length(0.1, 1.0), random.direction() * random.length(0.1, 1.0)];
+        shapes.push(("capsule", arc(Capsule::new(a, b, random.length(0.01, 0.5)))));
+    }
+    for (name, shape) in shapes {
+        let Some(hull) = shape.extent() else { continue };
+        let size = hull.diagonal();
+        for round in 0..40 {
+            let mut center = hull.center();
+            if round > 0 {
+                center[random.below(3)] += random.between(-0.5, 0.5) * size;
+            }
+            if round % 3 == 1 {
+                center += random.direction() * random.length(1e-17, 1e-9) * size;
+            }
+            let half = if round == 0 { 0.5 * hull.size() } else { DVec3::splat(random.length(1e-3, 1.0) * size) };
+            let cell = Aabb::new(center - half, center + half);
+            let below = shape.below(&cell);
+            for _ in 0..40 {
+                let q = random.within(&cell);
+                let said = below.value + below.slope.dot(q - cell.center());
+                assert!(said <= shape.at(q).upper + 1e-12 * size, "{name}: {said} at {q} of {cell:?}, {below:?}");
+            }
+        }
+    }
+}
+
 /// The laws of `Distance` against judges that know better: dense samples of the surface, of known density.
 #[test]
 fn ellipsoids_agree_with_their_surface() {

@@ -102,6 +102,7 @@ pub(super) fn clearance(
     let (mut pairs, mut patience) = (1, Patience::new(LEAST));
     loop {
         known.lower = heap.peek().map_or(known.upper, |first| first.bound).min(known.upper);
+        run.cancel.check()?;
         run.progress.report("search for the shortest way", known.boxes.min(budget), budget);
         let gap = known.upper - known.lower;
         let told = gap <= tolerance && (known.lower > 0.0 || known.upper <= 0.0 || pairs >= CLOSE);
@@ -197,7 +198,7 @@ fn in_doubt(solids: &[Solid<'_>; 2], first: &Waiting<Pair>, gap: f64) -> bool {
 /// A point as near to a solid as a step along its slope leads from another one, and no less than the way that is left.
 fn toward(solid: &dyn Distance, from: DVec3, step: f64) -> (DVec3, f64) {
     let left = solid.at(from).upper.max(0.0);
-    if left == 0.0 {
+    if left == 0.0 || !left.is_finite() {
         return (from, left);
     }
     let slope = solid.below(&Aabb::new(from, from)).slope.try_normalize();
@@ -272,9 +273,9 @@ impl<'a> Solid<'a> {
         let piece = Piece::of(self.of, extent)?;
         let mut reach = 0.0f64;
         if let Some(other) = self.against {
-            reach = reach.max(other.at(extent.center()).lower - extent.radius() * (1.0 + 1e-15));
+            reach = reach.max(other.over(extent).lower);
             if reach <= enough {
-                reach = reach.max(other.over(extent).lower).max(piece.least_of(&other.below(extent), extent));
+                reach = reach.max(piece.least_of(&other.below(extent), extent));
             }
         }
         (reach <= enough).then_some(Node { extent: *extent, piece, reach, parts: None })

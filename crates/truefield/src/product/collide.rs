@@ -153,14 +153,11 @@ struct Asked {
 }
 
 impl Asked {
-    /// Asks no more than is needed to see that a box has nothing below `enough`.
+    /// Asks no more than is needed to see that a box has nothing below `enough`. Only ranges tell where sides may jump.
     fn of(f: &dyn Distance, g: &dyn Distance, extent: &Aabb, enough: f64) -> Self {
         let center = extent.center();
         let (a, b) = (f.at(center), g.at(center));
-        let mut lower = a.lower.max(b.lower) - extent.radius() * (1.0 + 1e-15);
-        if lower <= enough {
-            lower = lower.max(f.over(extent).lower).max(g.over(extent).lower);
-        }
+        let mut lower = f.over(extent).lower.max(g.over(extent).lower);
         if lower <= enough {
             lower = lower.max(least_of_greater(&f.below(extent), &g.below(extent), 0.5 * extent.size()));
         }

@@ -34,11 +34,11 @@ impl Piece {
         }
         let (near, center, half) = (solid.below(extent), extent.center(), 0.5 * extent.size());
         if near.slope == DVec3::ZERO || !near.value.is_finite() {
-            return (near.value <= 0.0).then_some(Self { hull: *extent, plane: Affine::constant(0.0) });
+            return (!(near.value > 0.0)).then_some(Self { hull: *extent, plane: Affine::constant(0.0) });
         }
         let reach = near.slope.abs() * half;
         let all = reach.element_sum();
-        let slip = 1e-14 * (near.value.abs() + all);
+        let slip = 1e-14 * (near.value.abs() + all) + 8.0 * f64::EPSILON * center.abs().max_element() * near.slope.length();
         if near.value - all > slip {
             return None;
         }
@@ -93,7 +93,8 @@ impl Piece {
             let length = u.length();
             if length > 0.0 {
                 let apart = u.dot(across) + other.least(u) + self.least(-u);
-                let slip = 1e-14 * length * (across.length() + self.diagonal() + other.diagonal());
+                let place = self.hull.center().abs().max(other.hull.center().abs()).max_element();
+                let slip = length * (1e-14 * (across.length() + self.diagonal() + other.diagonal()) + 8.0 * f64::EPSILON * place);
                 found.least = found.least.max((apart - slip) / length);
             }
             found.least > enough

@@ -27,6 +27,10 @@ fn tangent(shape: &dyn Source, cell: &Aabb) -> Option<Affine> {
     shape.gradients(&[center], &mut slope).ok()?;
     let (value, slope) = (value[0], slope[0]);
     let size = center.abs().max_element().max(value.abs()).max(shape.extent().map_or(1.0, |extent| extent.diagonal()));
+    // What bends beyond the box, where differences step, is not known.
+    if radius > 0.0 && radius < STEP * size {
+        return None;
+    }
     let off = radius * (GRADIENT + STEP * size * most.max(0.0)).min(2.0) + 2.0 * shape.noise_over(cell) + 8.0 * f64::EPSILON * size;
     let value = value + slack.min(0.0) + 0.5 * bend.lower.min(0.0) * radius * radius - off;
     (value.is_finite() && slope.is_finite()).then_some(Affine { value, slope })

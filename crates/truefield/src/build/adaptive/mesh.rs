@@ -377,7 +377,8 @@ impl<'a> Builder<'a> {
             // The cheapest look at the list says enough where the surface is smooth.
             let at = seen.at(Some(halves.corner(CENTER).foot), list);
             let (mut known, turn) = self.prover.planes(&at, seen.known);
-            if turn < 1.0 && !within(known, seen.limit) {
+            let certain = (0..NODES).all(|number| halves.corner(number).certain);
+            if certain && turn < 1.0 && !within(known, seen.limit) {
                 let differences = (0..NODES).map(|number| Interval::exact(halves.corner(number).value - blended[number]));
                 let differences = differences.fold(NOTHING, Interval::hull);
                 known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * seen.cell.size().x, turn));

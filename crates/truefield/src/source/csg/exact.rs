@@ -52,7 +52,11 @@ impl<T: Exact> Distance for T {
     fn below(&self, cell: &Aabb) -> Affine {
         let (center, bend, least) = (cell.center(), self.curving(cell), self.over(cell).lower);
         let radius = cell.radius() * (1.0 + 1e-12);
-        let value = self.value(center) + 0.5 * bend.lower.min(0.0) * radius * radius - 1e-14 * radius - 2.0 * self.rounding();
+        // Rounding of the place turns the slope as fast as the distance bends there: any way next to an axis or an edge.
+        let here = self.curving(&Aabb::new(center, center));
+        let place = center.abs().max(self.hull().map_or(DVec3::ZERO, |hull| hull.min.abs().max(hull.max.abs()))).max_element();
+        let turn = (64.0 * f64::EPSILON * place * here.upper.max(-here.lower)).min(2.0) + 1e-14;
+        let value = self.value(center) + 0.5 * bend.lower.min(0.0) * radius * radius - turn * radius - 2.0 * self.rounding();
         let tangent = Affine { value, slope: self.slope(center) };
         tangent.or_constant(least, radius)
     }

@@ -5,9 +5,10 @@
 //! in B. Outside, the distance is |p - x| >= n . (p - x) >= n . p - h.
 //!
 //! B beyond the plane n . x = h holds no surface: where the side changes at the surface only it has one side, and one point
-//! tells that it is outside, c itself where the ball around it that touches the surface sticks out of the plane. Then p inside is not beyond the plane, and the way from it along n to the plane, h - n . p
-//! long, ends outside or leaves B, and so is no shorter than the way to the surface: the distance is no less than
-//! n . p - h again. Where vertices were joined, sides are open in a layer around the surface, by which all ways may be off.
+//! tells that it is outside, c itself where the ball around it that touches the surface sticks out of the plane. Then p inside
+//! is not beyond the plane, and the way from it along n to the plane, h - n . p long, ends outside or leaves B, and so is no
+//! shorter than the way to the surface: the distance is no less than n . p - h again. Where vertices were joined, sides are
+//! open in a layer around the surface, by which all ways may be off.
 
 use std::collections::BinaryHeap;
 
@@ -186,7 +187,7 @@ fn level(facet: &Facet, a: DVec3, n: DVec3, squared: f64, size: f64) -> Option<f
     }
     let at = middle + along * (radius / steep) - a;
     // Directions in the plane are off by what the plane is, over how steep it is.
-    let off = slip / steep + slip;
+    let off = slip / steep + slip + (radius - (squared - middle.length_squared()).max(0.0).sqrt()) * (1.0 + 1e-9);
     let inward = |from: DVec3, edge: DVec3| unit.cross(edge).dot(at - from) >= -off * edge.length();
     let on = inward(DVec3::ZERO, facet.ab) && inward(facet.ab, facet.ac - facet.ab) && inward(facet.ac, -facet.ac);
     on.then_some(top)

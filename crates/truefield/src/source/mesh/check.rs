@@ -219,7 +219,8 @@ impl Check {
             (0..count as u32).filter(|&s| largest[s as usize].1 != u32::MAX).map(|s| (s, largest[s as usize].1)).collect();
         self.shells = shells.len();
         // A single surface that nothing is wrong with parts space in two, and its volume tells which part is inside.
-        let rounding = 4.0 * f64::EPSILON * (count + 64) as f64 * self.area * mesh.extent().diagonal();
+        let diagonal = mesh.extent().diagonal();
+        let rounding = 4.0 * f64::EPSILON * (count + 64) as f64 * (self.area + diagonal * diagonal) * diagonal;
         if let &[(shell, _)] = &shells[..]
             && self.volume.abs() > rounding
             && self.fault().is_none()

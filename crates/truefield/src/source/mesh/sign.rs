@@ -169,9 +169,14 @@ impl Signs {
     pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
         let Some(decided) = &self.decided else { return Side::Outside };
         if self.blurred(nearest) {
-            return if decided.sum.side(p).sign() < 0.0 { Side::PerhapsInside } else { Side::PerhapsOutside };
+            return decided.guess(mesh, p, triangle);
         }
-        decided.near(mesh, p, nearest, triangle).map_or_else(|| decided.sum.side(p), |(side, _)| side)
+        match decided.near(mesh, p, nearest, triangle) {
+            Some((side, _)) => side,
+            // On the surface there is no side to look for.
+            None if nearest.distance_squared == 0.0 => Side::PerhapsOutside,
+            None => decided.sum.side(p),
+        }
     }
 
     /// The side of every point of the ball around `p`, which does not touch the surface, if they all have one.
@@ -198,6 +203,7 @@ impl Signs {
             Some(decided) if !self.parted && !matches!(decided.walls, Walls::Trusted) && !self.blurred(nearest) => {
                 match decided.near(mesh, p, nearest, triangle) {
                     Some(known) => known,
+                    None if nearest.distance_squared == 0.0 => (Side::PerhapsOutside, 0.0),
                     None => decided.sum.steady(p, radius),
                 }
             }
@@ -266,16 +272,29 @@ impl Decided {
     /// The side of `p` by its nearest triangle, and the length of paths off the surface that stay on it; `None` where the
     /// triangle cannot tell.
     fn near(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<(Side, f64)> {
-        let wall = match &self.walls {
-            Walls::Trusted | Walls::Clean => Wall::CLEAN,
-            Walls::Known(walls) => walls[triangle as usize],
-        };
+        let wall = self.wall(triangle);
         let left = f64::from(wall.reach) - nearest.distance_squared.sqrt() * (1.0 + 1e-9) - self.normals.rounding();
         if left <= 0.0 {
             return None;
         }
         let height = self.normals.side(self.joined.as_deref().unwrap_or(mesh), p, nearest, triangle)?;
         Some((wall.side(height), left))
+    }
+
+    fn wall(&self, triangle: u32) -> Wall {
+        match &self.walls {
+            Walls::Trusted | Walls::Clean => Wall::CLEAN,
+            Walls::Known(walls) => walls[triangle as usize],
+        }
+    }
+
+    /// A guess by the plane of the nearest triangle, for points so near that nothing better can be known.
+    fn guess(&self, mesh: &TriangleMesh, p: DVec3, triangle: u32) -> Side {
+        let [a, b, c] = mesh.corners(triangle);
+        match self.wall(triangle).side((b - a).cross(c - a).dot(p - a)) {
+            Side::Inside | Side::PerhapsInside => Side::PerhapsInside,
+            Side::Outside | Side::PerhapsOutside => Side::PerhapsOutside,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::bvh::boundary::Boundary;
 use crate::bvh::winding::{Estimate, Winding};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Sets;
@@ -26,7 +26,7 @@ pub(crate) struct Sum {
     /// The triangles that count.
     triangles: Vec<u32>,
     /// Made when first asked for: sound surfaces seldom need it.
-    winding: OnceLock<Winding>,
+    winding: OnceLock<Option<Winding>>,
     pub boundary: Boundary,
     cap: Option<Winding>,
     extent: Aabb,
@@ -42,20 +42,19 @@ impl Sum {
 
     /// The winding numbers of the surface.
     pub fn winding(&self, run: &Run<'_>) -> Result<&Winding> {
-        if let Some(made) = self.winding.get() {
-            return Ok(made);
+        if self.winding.get().is_none() {
+            let made = winding(&self.mesh, &self.triangles, run)?;
+            return self.winding.get_or_init(|| Some(made)).as_ref().ok_or(Error::Cancelled);
         }
-        let made = winding(&self.mesh, &self.triangles, run)?;
-        Ok(self.winding.get_or_init(|| made))
+        self.winding.get().and_then(Option::as_ref).ok_or(Error::Cancelled)
     }
 
     /// [`Winding::refine`]; nothing is known where the winding numbers cannot be had.
     fn refine(&self, p: DVec3, enough: impl Fn(Estimate) -> bool) -> Estimate {
-        // A default run asks the system how many threads there are, which takes longer than all else here.
-        match self.winding.get().map_or_else(|| self.winding(&Run::default()), Ok) {
-            Ok(winding) => winding.refine(p, enough),
-            Err(_) => Estimate { value: 0.0, error: f64::INFINITY, doubt: f64::INFINITY },
-        }
+        // Whoever asks first makes them, on a thread of its own; the others wait.
+        let made = self.winding.get_or_init(|| winding(&self.mesh, &self.triangles, &Run::with_threads(1)).ok());
+        let unknown = Estimate { value: 0.0, error: f64::INFINITY, doubt: f64::INFINITY };
+        made.as_ref().map_or(unknown, |winding| winding.refine(p, enough))
     }
 
     pub fn side(&self, p: DVec3) -> Side {

@@ -16,7 +16,9 @@ impl Oriented {
     /// Around points, and along the directions as far as they differ.
     pub(super) fn around(points: impl Iterator<Item = DVec3> + Clone, [u, v]: [DVec3; 2]) -> Self {
         let x = u.try_normalize().unwrap_or(DVec3::X);
-        let z = x.cross(v).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
+        let across = x.cross(v);
+        // Of directions that nearly agree the product is rounding.
+        let z = if across.length() > 1e-6 * v.length() { across.normalize() } else { x.any_orthonormal_vector() };
         let axes = [x, z.cross(x), z];
         let local = |p: DVec3| DVec3::from_array(axes.map(|axis| axis.dot(p)));
         let (low, high) =
@@ -49,7 +51,8 @@ mod tests {
         for round in 0..20_000 {
             let size = random.length(1e-6, 1e6);
             let center = random.direction() * (size * random.length(1e-3, 1e6));
-            let [u, v] = [random.direction(), random.direction()].map(|d| if round % 7 == 0 { DVec3::ZERO } else { d * size });
+            let u = if round % 7 == 0 { DVec3::ZERO } else { random.direction() * size };
+            let v = if round % 5 == 0 { u * random.between(-3.0, 3.0) } else { random.direction() * size };
             let points: Vec<DVec3> =
                 (0..16).map(|_| center + u * random.unit() + v * random.unit() + random.direction() * (1e-3 * size)).collect();
             let around = Oriented::around(points.iter().copied(), [u, v]);
