@@ -121,23 +121,36 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
         *lane = if (distance < low) | (distance > high) { -1.0 } else { reach };
     }
     for (&slot, row) in list.iter().zip(rows.iter()) {
-        let mut chosen = [0u8; BLOCK + LANES];
-        let mut count = 0;
-        for part in 0..PARTS {
-            let mut mask = F::mask_not_above(&row[part], &least[part]);
-            while mask != 0 {
-                chosen[count] = (part * LANES) as u8 + mask.trailing_zeros() as u8;
-                count += 1;
-                mask &= mask - 1;
-            }
-        }
-        exact(tree, points, slot, &chosen[..count], out);
+        exact_near::<F, PARTS>(tree, points, slot, row, &least, out);
     }
+}
+
+/// Offers a triangle to the points for which its filtered squared distance is not above a limit.
+#[inline(always)]
+pub(super) fn exact_near<F: Fuse, const N: usize>(
+    tree: &Tree,
+    points: &Points,
+    slot: Slot,
+    squared: &[[f32; LANES]; N],
+    limits: &[[f32; LANES]; N],
+    out: &mut Answers,
+) {
+    let mut chosen = [0u8; BLOCK + LANES];
+    let mut count = 0;
+    for part in 0..N {
+        let mut mask = F::mask_not_above(&squared[part], &limits[part]);
+        while mask != 0 {
+            chosen[count] = (part * LANES) as u8 + mask.trailing_zeros() as u8;
+            count += 1;
+            mask &= mask - 1;
+        }
+    }
+    exact(tree, points, slot, &chosen[..count], out);
 }
 
 /// Offers a triangle to the chosen points; the lowest index keeps ties.
 #[inline(always)]
-pub(super) fn exact(tree: &Tree, points: &Points, slot: Slot, chosen: &[u8], out: &mut Answers) {
+fn exact(tree: &Tree, points: &Points, slot: Slot, chosen: &[u8], out: &mut Answers) {
     let (facet, triangle) = (*tree.facet_at(slot), tree.triangle(slot));
     for group in chosen.chunks(GROUP) {
         let mut p = [[0.0f64; GROUP]; 3];

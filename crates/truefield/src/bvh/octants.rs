@@ -6,7 +6,7 @@
 //! rules out for an octant. Witnesses are the exact nearest points of the octant's corners.
 
 use super::cover::{OCTANTS, filter_error};
-use super::evaluate::{Answers, Points, exact};
+use super::evaluate::{Answers, Points, exact_near};
 use super::frame::Offsets;
 use super::nearest::Candidate;
 use super::tree::{Slot, Tree};
@@ -221,17 +221,7 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
     least[0][..CORNERS].fill(-1.0);
     least[1][NODES - LANES..].fill(-1.0);
     for (&slot, row) in list.iter().zip(rows.iter()) {
-        let mut chosen = [0u8; PARTS * LANES];
-        let mut count = 0;
-        for part in 0..PARTS {
-            let mut mask = F::mask_not_above(&row[part], &least[part]);
-            while mask != 0 {
-                chosen[count] = (part * LANES) as u8 + mask.trailing_zeros() as u8;
-                count += 1;
-                mask &= mask - 1;
-            }
-        }
-        exact(tree, points, slot, &chosen[..count], answers);
+        exact_near::<F, PARTS>(tree, points, slot, row, &least, answers);
     }
 }
 
