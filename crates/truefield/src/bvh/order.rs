@@ -1,7 +1,7 @@
 //! Visiting scattered points so that neighbours follow each other.
 //!
-//! Points are sorted along a space-filling (Morton) curve in runs of the given order, run by run; the runs are cut at
-//! the same places of the curve, and what lies between two cuts is one piece of work. Nothing depends on the threads.
+//! Points are sorted along a space-filling (Morton) curve, or by another key, in runs of the given order, run by run; the
+//! runs are cut at the same keys, and what lies between two cuts is one piece of work. Nothing depends on the threads.
 
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3};
@@ -17,8 +17,8 @@ const PIECES: usize = 128;
 
 const BITS: u32 = 10;
 
-/// Where a point lies on the curve, then its index.
-type Place = (u32, u32);
+/// Where a point lies on the curve, or another key, then its index.
+pub(crate) type Place = (u32, u32);
 
 /// What `answer` makes of all points, in their order. It is given some thousand points that follow each other along the
 /// curve, and their places on it, ascending; which ones does not depend on the threads.
@@ -32,9 +32,36 @@ pub(crate) fn along_curve<T: Copy + Send + Sync>(
 ) -> Result<Vec<T>> {
     let boxes = run.blocks(phase, points.len().div_ceil(RUN), |at| Ok(around(&points[part(at, points.len())])))?;
     let curve = Curve::over(&boxes.iter().fold(Aabb::EMPTY, |all, &one| all.union(one)));
-    let runs = run.blocks(phase, boxes.len(), |at| {
+    // By a finer curve of their own: the first may have been spoilt by a point far away.
+    by_key(phase, points, run, |p| curve.place(p), |points| along_own_curve(points, &answer))
+}
+
+/// What `answer` makes of points, in their order, given them along a curve around them, with their places on it.
+pub(crate) fn along_own_curve<T: Copy>(points: &[DVec3], answer: impl FnOnce(&[DVec3], &[u32]) -> Vec<T>) -> Vec<T> {
+    let curve = Curve::over(&around(points));
+    let mut places: Vec<Place> = points.iter().enumerate().map(|(i, &p)| (curve.place(p), i as u32)).collect();
+    sort(&mut places);
+    let (keys, points): (Vec<u32>, Vec<DVec3>) = places.iter().map(|&(key, i)| (key, points[i as usize])).unzip();
+    let sorted = answer(&points, &keys);
+    let mut answers = sorted.clone();
+    for (&(_, i), &answer) in places.iter().zip(&sorted) {
+        answers[i as usize] = answer;
+    }
+    answers
+}
+
+/// What `answer` makes of all points, in their order. It is given some thousand points, in any order, whose keys follow
+/// those of the points before; which ones does not depend on the threads.
+pub(crate) fn by_key<T: Copy + Send + Sync>(
+    phase: &'static str,
+    points: &[DVec3],
+    run: &Run<'_>,
+    key: impl Fn(DVec3) -> u32 + Sync,
+    answer: impl Fn(&[DVec3]) -> Vec<T> + Sync,
+) -> Result<Vec<T>> {
+    let runs = run.blocks(phase, points.len().div_ceil(RUN), |at| {
         let range = part(at, points.len());
-        let mut places: Vec<Place> = points[range.clone()].iter().zip(range).map(|(&p, i)| (curve.place(p), i as u32)).collect();
+        let mut places: Vec<Place> = points[range.clone()].iter().zip(range).map(|(&p, i)| (key(p), i as u32)).collect();
         sort(&mut places);
         Ok(places)
     })?;
@@ -42,17 +69,7 @@ pub(crate) fn along_curve<T: Copy + Send + Sync>(
     let answers = run.blocks(phase, pieces.len(), |piece| {
         let fetched: Vec<DVec3> =
             runs.iter().zip(&pieces[piece]).flat_map(|(run, part)| run[part.clone()].iter().map(|&(_, i)| points[i as usize])).collect();
-        // By a finer curve of its own: the first may have been spoilt by a point far away.
-        let curve = Curve::over(&around(&fetched));
-        let mut places: Vec<Place> = fetched.iter().enumerate().map(|(i, &p)| (curve.place(p), i as u32)).collect();
-        sort(&mut places);
-        let (keys, points): (Vec<u32>, Vec<DVec3>) = places.iter().map(|&(key, i)| (key, fetched[i as usize])).unzip();
-        let sorted = answer(&points, &keys);
-        let mut answers = sorted.clone();
-        for (&(_, i), &answer) in places.iter().zip(&sorted) {
-            answers[i as usize] = answer;
-        }
-        Ok(answers)
+        Ok(answer(&fetched))
     })?;
     let Some(&any) = answers.first().and_then(|piece| piece.first()) else { return Ok(Vec::new()) };
     let mut out = vec![any; points.len()];
@@ -97,35 +114,39 @@ fn pieces(runs: &[Vec<Place>], count: usize) -> Vec<Vec<std::ops::Range<usize>>>
 }
 
 /// A Morton curve through a box.
-struct Curve {
+pub(crate) struct Curve {
     origin: DVec3,
     scale: DVec3,
 }
 
 impl Curve {
-    fn over(extent: &Aabb) -> Self {
+    pub fn over(extent: &Aabb) -> Self {
         let cells = f64::from(1u32 << BITS);
         let scale = extent.size().max(DVec3::splat(f64::MIN_POSITIVE)).recip() * (cells * (1.0 - 1e-9));
         Self { origin: extent.min, scale }
     }
 
-    fn place(&self, p: DVec3) -> u32 {
+    pub fn place(&self, p: DVec3) -> u32 {
         let q = (p - self.origin) * self.scale;
         let spread = |x: f64| spread_bits((x as u32).min((1 << BITS) - 1));
         spread(q.x) | spread(q.y) << 1 | spread(q.z) << 2
     }
 }
 
-/// Sorts by place on the curve; equal places keep their order.
-fn sort(places: &mut Vec<Place>) {
+/// Sorts by key; equal keys keep their order.
+pub(crate) fn sort(places: &mut Vec<Place>) {
     // Counting pays for its tables only where there are many.
     if places.len() < 256 {
         return places.sort_unstable();
     }
+    let first = places[0].0;
+    let differing = places.iter().fold(0, |bits, (key, _)| bits | (key ^ first));
     let mut other = vec![(0, 0); places.len()];
-    for shift in [0, 10, 20] {
-        pass(places, &mut other, shift);
-        std::mem::swap(places, &mut other);
+    for shift in [0, 10, 20, 30] {
+        if differing >> shift & 1023 != 0 {
+            pass(places, &mut other, shift);
+            std::mem::swap(places, &mut other);
+        }
     }
 }
 

@@ -180,9 +180,9 @@ pub(crate) fn block_range(grid: &Grid) -> ([i64; 3], [usize; 3]) {
     (low, shape)
 }
 
-/// A cell's triangles, or where to start a search.
-pub(super) enum Found<'a> {
-    List(&'a CellBlock, usize),
+/// A cell's triangles, by the numbers of its block and of its list there, or where to start a search.
+pub(super) enum Found {
+    List(usize, usize),
     Start(u32),
 }
 
@@ -209,38 +209,49 @@ impl CompleteField {
 
     /// Class and list length of a cell; `None` for the length where the tree answers.
     pub fn cell(&self, [i, j, k]: [u32; 3]) -> (CellClass, Option<usize>) {
-        let (block, index) = self.place([i as usize, j as usize, k as usize]);
+        let (number, index) = self.place([i as usize, j as usize, k as usize]);
+        let block = &self.blocks[number];
         let (held, class) = block.cell(index);
         let length = if let CellList::Whole(list) = held { Some(block.list(list).count()) } else { None };
         (class, length)
     }
 
-    fn place(&self, mut cell: [usize; 3]) -> (&CellBlock, usize) {
+    /// The number of a cell's block, and of the cell in it.
+    fn place(&self, mut cell: [usize; 3]) -> (usize, usize) {
         let shape = self.block_shape();
         for axis in 0..3 {
             cell[axis] += self.grid.first[axis].rem_euclid(EDGE as i64) as usize;
         }
         let [a, b, c] = cell.map(|i| i / EDGE);
         let [i, j, k] = cell.map(|i| i % EDGE);
-        (&self.blocks[(a * shape[1] + b) * shape[2] + c], (i * EDGE + j) * EDGE + k)
+        ((a * shape[1] + b) * shape[2] + c, (i * EDGE + j) * EDGE + k)
     }
 
-    /// The list of the cell that holds `p` (model units), and the cell's class.
-    pub(super) fn find(&self, p: DVec3) -> (Found<'_>, CellClass) {
+    /// The place of the cell that holds `p` (model units).
+    pub(super) fn place_of(&self, p: DVec3) -> Option<(usize, usize)> {
         let index = (p - self.grid.origin) / self.grid.spacing;
         let mut cell = [0; 3];
         for axis in 0..3 {
             let count = f64::from(self.grid.shape[axis]);
             let local = index[axis] - self.grid.first[axis] as f64;
             if !(local >= 0.0 && local < count) {
-                return (Found::Start(0), CellClass::Undecided);
+                return None;
             }
             cell[axis] = local as usize;
         }
-        let (block, at) = self.place(cell);
-        let (held, class) = block.cell(at);
+        Some(self.place(cell))
+    }
+
+    /// The list of the cell that holds `p` (model units), and the cell's class.
+    pub(super) fn find(&self, p: DVec3) -> (Found, CellClass) {
+        let Some((number, index)) = self.place_of(p) else {
+            let beyond = self.surface.beyond(p * self.surface.scale());
+            return (Found::Start(0), if beyond { CellClass::Outside } else { CellClass::Undecided });
+        };
+        let block = &self.blocks[number];
+        let (held, class) = block.cell(index);
         let found = match held {
-            CellList::Whole(list) => Found::List(block, list),
+            CellList::Whole(list) => Found::List(number, list),
             CellList::Start(list) => Found::Start(block.list(list).next().unwrap_or(0)),
             CellList::Absent => Found::Start(0),
         };
@@ -256,7 +267,7 @@ impl CompleteField {
         let mut best = Candidate::within(f64::INFINITY);
         match found {
             Found::List(block, list) => {
-                for triangle in block.list(list) {
+                for triangle in self.blocks[block].list(list) {
                     best.offer(tree.facet(triangle).distance_squared(scaled), triangle);
                 }
             }

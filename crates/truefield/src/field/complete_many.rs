@@ -1,13 +1,22 @@
-//! Many points of a complete field at once: those with a list by the list, the others together by the tree.
+//! Many points of a complete field at once: those of one list together by the list, those without by the tree.
 
-use super::complete::{CellClass, CompleteField, Found};
+use super::complete::{ABSENT, CellClass, CompleteField, Found};
 use crate::bvh::Candidate;
-use crate::bvh::order::along_curve;
-use crate::bvh::pairs::{Pair, offer};
+use crate::bvh::order::{Curve, Place, along_own_curve, by_key, sort};
+use crate::bvh::pairs::{Group, Pair, offer, offer_lists};
 use crate::error::Result;
 use crate::geom::{DVec3, Interval, Nearest};
 use crate::run::Run;
 use crate::source::mesh::check_points;
+
+/// Lists of a block have smaller numbers.
+const LISTS: usize = ABSENT as usize;
+
+/// Lanes of points pay from so many that share a list.
+const FEW: usize = 3;
+
+/// Bits of the places of points beyond the cells that only their own curve tells apart.
+const COARSE: u32 = 12;
 
 impl CompleteField {
     /// Signed distances, negative inside. A fraction of a microsecond a point where lists are short.
@@ -36,32 +45,63 @@ impl CompleteField {
         answer: impl Fn(DVec3, Candidate, CellClass) -> T + Sync,
     ) -> Result<Vec<T>> {
         check_points(points)?;
-        along_curve("query the field", points, run, |points, keys| {
-            let (found, classes) = self.search_many(points, keys);
+        let extent = self.grid().extent();
+        // Points beyond the cells come after the others, with their neighbours.
+        let curve = Curve::over(&extent.grow(extent.size().max_element()));
+        let key = |p| self.place_of(p).map_or_else(|| self.blocks.len() as u32 + (curve.place(p) >> COARSE), |(block, _)| block as u32);
+        by_key("query the field", points, run, key, |points| {
+            let (found, classes) = self.search_many(points);
             points.iter().zip(found).zip(classes).map(|((&p, found), class)| answer(p, found, class)).collect()
         })
     }
 
-    /// Nearest triangles, and the classes of cells, of points that are sorted by their places on a Morton curve.
-    fn search_many(&self, points: &[DVec3], keys: &[u32]) -> (Vec<Candidate>, Vec<CellClass>) {
+    /// Nearest triangles, and the classes of cells, of some thousand points.
+    fn search_many(&self, points: &[DVec3]) -> (Vec<Candidate>, Vec<CellClass>) {
         let (tree, scale) = (self.surface().tree(), self.surface().scale());
         let scaled: Vec<DVec3> = points.iter().map(|&p| p * scale).collect();
-        let (mut pairs, mut others) = (Vec::with_capacity(8 * points.len()), Vec::new());
+        let mut found = vec![Candidate::within(f64::INFINITY); points.len()];
+        let (mut lists, mut listed, mut others) = (Vec::with_capacity(points.len()), Vec::with_capacity(points.len()), Vec::new());
         let class = |(point, &p): (usize, &DVec3)| {
             let (held, class) = self.find(p);
             match held {
-                Found::List(block, list) => pairs.extend(block.list(list).map(|triangle| Pair { point: point as u32, triangle })),
-                Found::Start(_) => others.push(point),
+                Found::List(block, list) => {
+                    lists.push((block, list));
+                    listed.push(((block * LISTS + list) as u32, point as u32));
+                }
+                Found::Start(_) => {
+                    lists.push((0, 0));
+                    others.push(point);
+                }
             }
             class
         };
         let classes = points.iter().enumerate().map(class).collect();
-        let mut found = vec![Candidate::within(f64::INFINITY); points.len()];
-        offer(tree, &scaled, &pairs, &mut found);
-        let (there, keys): (Vec<DVec3>, Vec<u32>) = others.iter().map(|&point| (scaled[point], keys[point])).unzip();
-        for (point, nearest) in others.into_iter().zip(tree.nearest_sorted(&there, &keys)) {
+        self.offer(&lists, listed, &scaled, &mut found);
+        let there: Vec<DVec3> = others.iter().map(|&point| scaled[point]).collect();
+        for (point, nearest) in others.into_iter().zip(along_own_curve(&there, |points, keys| tree.nearest_sorted(points, keys))) {
             found[point] = nearest;
         }
         (found, classes)
+    }
+
+    /// Offers every point the list of its cell. Points of equal lists have equal keys, though others may have them too.
+    fn offer(&self, lists: &[(usize, usize)], mut listed: Vec<Place>, points: &[DVec3], found: &mut [Candidate]) {
+        sort(&mut listed);
+        let (mut pairs, mut groups, mut triangles, mut start) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        for same in listed.chunk_by(|a, b| lists[a.1 as usize] == lists[b.1 as usize]) {
+            let (block, list) = lists[same[0].1 as usize];
+            let list = self.blocks[block].list(list);
+            if same.len() < FEW {
+                pairs.extend(list.flat_map(|triangle| same.iter().map(move |&(_, point)| Pair { point, triangle })));
+            } else {
+                let first = triangles.len();
+                triangles.extend(list);
+                groups.push(Group { points: start..start + same.len(), triangles: first..triangles.len() });
+            }
+            start += same.len();
+        }
+        let tree = self.surface().tree();
+        offer(tree, points, &pairs, found);
+        offer_lists(tree, points, &listed, &triangles, &groups, found);
     }
 }

@@ -82,6 +82,11 @@ impl Surface {
         self.signs.side(&self.work, p, nearest, triangle)
     }
 
+    /// Whether `p`, in the tree's units, is certainly outside by its place alone.
+    pub(crate) fn beyond(&self, p: DVec3) -> bool {
+        self.signs.beyond(p)
+    }
+
     /// The one side of a ball that does not touch the surface, in the tree's units.
     pub(crate) fn side_of_ball(&self, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> Option<Side> {
         self.signs.side_of_ball(&self.work, p, nearest, triangle, radius)

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::bvh::Tree;
 use crate::error::Result;
-use crate::geom::{DVec3, FacetPoint};
+use crate::geom::{Aabb, DVec3, FacetPoint};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
@@ -100,6 +100,8 @@ struct Decided {
     normals: Pseudonormals,
     walls: Walls,
     sum: Sum,
+    /// All points beyond it are outside, where the mesh is closed; all space where that is not known.
+    hull: Aabb,
     /// The mesh that sides are decided on, where it is not the mesh itself.
     joined: Option<Arc<TriangleMesh>>,
 }
@@ -156,8 +158,10 @@ impl Signs {
             (normals, if fault.is_none() { Walls::Clean } else { known()? })
         };
         let parted = closed && !matches!(walls, Walls::Trusted);
-        let decided = Decided { normals, walls, sum, joined: joined.map(|joined| joined.mesh) };
-        Ok(Self { rule, decided: Some(decided), parted, blur: BLUR * moved })
+        let blur = BLUR * moved;
+        let hull = if parted { mesh.extent().grow(2.0 * blur) } else { Aabb::new(DVec3::NEG_INFINITY, DVec3::INFINITY) };
+        let decided = Decided { normals, walls, sum, hull, joined: joined.map(|joined| joined.mesh) };
+        Ok(Self { rule, decided: Some(decided), parted, blur })
     }
 
     /// Which rule decides, and why.
@@ -229,6 +233,11 @@ impl Signs {
         (plain && decided.normals.whole(triangle)).then(|| decided.normals.rounding())
     }
 
+    /// Whether `p` is certainly outside, wherever the surface is near it.
+    pub fn beyond(&self, p: DVec3) -> bool {
+        self.decided.as_ref().is_none_or(|decided| !decided.hull.contains(p))
+    }
+
     /// Whether the point is so near that joining vertices may have turned its side.
     fn blurred(&self, nearest: &FacetPoint) -> bool {
         nearest.distance_squared <= self.blur * self.blur
@@ -272,6 +281,9 @@ impl Decided {
     /// The side of `p` by its nearest triangle, and the length of paths off the surface that stay on it; `None` where the
     /// triangle cannot tell.
     fn near(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<(Side, f64)> {
+        if !self.hull.contains(p) {
+            return Some((Side::Outside, f64::INFINITY));
+        }
         let wall = self.wall(triangle);
         let left = f64::from(wall.reach) - nearest.distance_squared.sqrt() * (1.0 + 1e-9) - self.normals.rounding();
         if left <= 0.0 {
@@ -524,7 +536,10 @@ mod tests {
                 assert!(side.is_certain() && carry > 0.0);
                 let by_sum = sum.side(p);
                 assert!(by_sum == side || !by_sum.is_certain(), "{what} at {p}: {side:?}, {by_sum:?}, {foot:?} of {triangle}");
-                // Along any path off the surface that is not too long.
+                // Along any path off the surface that is not too long; the shortest may round to the surface.
+                if foot.distance_squared.sqrt() <= decided.normals.rounding() {
+                    continue;
+                }
                 let step = carry.min(foot.distance_squared.sqrt()) * 0.999;
                 let q = p + DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5).normalize_or_zero() * step;
                 let there = sum.side(q);
