@@ -221,11 +221,13 @@ def field(
     Next to smooth surface, `bounds` are within 1e-10 of the domain's diagonal, and within 1e-6 where several places are
     nearly as far: a foot is found by Newton's method, that nothing is nearer is proven with intervals of second
     derivatives, that nothing is farther by a change of sign. At kinks (of `minimum`, `maximum`, `absolute`) they are
-    within 1e-4 of the diagonal, and slow. Where the formula touches zero without a change of sign, surface cannot be
-    told from none and bounds are wide; a sign that changes through a pole counts as surface.
+    within 2e-4 of the diagonal, and slow. A change of sign is surface, through zero or through a pole; zeros that the
+    formula only touches, as squares do, are none. Where interval arithmetic cannot tell one from the other, `bounds`
+    hold both: the lower one is the distance to where surface may be, the upper one that to where it is for certain,
+    which may be infinite. To give such a zero set a thickness, subtract a positive number.
 
     Raises:
-        TruefieldError: the domain is missing or no finite box, or the formula is positive in all of it; when asked,
+        TruefieldError: the domain is missing or no finite box, or the formula is nowhere negative in it; when asked,
             the formula is not defined at a point of the domain.
     """
     if not isinstance(expression, Expression):

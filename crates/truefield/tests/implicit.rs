@@ -234,6 +234,48 @@ fn kinks_and_poles_and_cusps_stay_honest() {
     }
 }
 
+/// Zeros that the formula only touches are no surface.
+#[test]
+fn touching_zero_is_no_surface() {
+    let run = Run::with_threads(1);
+    let [x, y, _] = axes();
+    let doubled = square(&ball());
+    for formula in [doubled.clone(), ball().unary(Unary::Absolute), square(&x), x.clone() * 0.0, square(&x) * ball().unary(Unary::Absolute)]
+    {
+        let refusal = Implicit::new(&formula, cube(1.5), &run).expect_err("no inside").to_string();
+        assert!(refusal.contains("nowhere negative") && refusal.contains("subtract"), "{refusal}");
+    }
+    // All is inside but for zeros that are touched from there.
+    let inner = shape(&(-doubled), cube(1.5));
+    let mut random = Random::new(21);
+    let mut places = points(&mut random, &cube(1.4), 100);
+    places.extend((0..50).map(|_| random.direction()));
+    places.push(DVec3::X);
+    for p in places {
+        let (at, depth) = (inner.at(p), 1.5 - p.abs().max_element());
+        assert!(at.contains(-depth) && at.width() < 1e-9, "{at:?} at {p} is not -{depth}");
+    }
+    // x^2 (x + y): the plane x = 0 is touched from outside where y > 0, from inside where y < 0.
+    let wedge = shape(&(square(&x) * (&x + &y)), cube(1.0));
+    for n in 0..60 {
+        let mut p = random.within(&cube(0.3));
+        if n % 2 == 0 {
+            p.x = 0.0;
+        }
+        let (at, truth) = (wedge.at(p), (p.x + p.y) / 2.0_f64.sqrt());
+        assert!(at.widen(1e-14).contains(truth), "{at:?} at {p} is not {truth}");
+        assert!(at.width() < 1e-2 && (at.lower < 0.0) == (truth < 0.0), "{at:?} at {p} is not {truth}");
+    }
+    // Written out, x^2 - x + 1/4 + y^2 + z^2 cannot be told from what is negative somewhere next to (1/2, 0, 0).
+    let [x, y, z] = axes();
+    let point = shape(&(square(&x) - (x - 0.25) + square(&y) + square(&z)), cube(1.0));
+    for p in points(&mut random, &cube(2.0), 100) {
+        let at = point.at(p);
+        assert!(at.upper == f64::INFINITY && at.lower <= (p - DVec3::X * 0.5).length(), "{at:?} at {p}");
+        assert!(at.lower >= (p - DVec3::X * 0.5).length() - 5e-3, "{at:?} at {p}");
+    }
+}
+
 #[test]
 fn what_is_no_shape_is_refused() {
     let run = Run::with_threads(1);

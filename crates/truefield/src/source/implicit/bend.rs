@@ -22,7 +22,7 @@ pub(super) fn bend(shape: &Implicit, cell: &Aabb) -> Interval {
         let Interval { lower, upper } = shape.at(center);
         return around_point(lower.max(-upper) - radius, if lower > 0.0 { Side::Outside } else { Side::Inside });
     }
-    let Some(side) = Side::of(shape.tape().certain(center)) else {
+    let Some(side) = shape.side(center) else {
         // The surface runs through the middle.
         return smooth(shape, cell, &Middle { side: None, near: 0.0, far: shape.at(center).upper, foot: center }).unwrap_or(Interval::ALL);
     };

@@ -11,7 +11,13 @@ use crate::run::Run;
 const BLOCK: usize = 64;
 
 /// Levels of halving: at kinks and where sheets meet, the finest box is this fine.
-const LEVELS: u32 = 11;
+const LEVELS: u32 = 13;
+
+/// How far around a box the formula keeps its sign, in sizes of the box, where it may touch zero in it without surface.
+const MARGIN: f64 = 1e-3;
+
+/// Steps toward the other side.
+const BEYOND: usize = 8;
 
 /// No level has more boxes; where it would, the boxes stay as they are.
 const MOST: usize = 1 << 20;
@@ -25,8 +31,17 @@ pub(super) struct Node {
     pub count: u8,
     /// How well the surface of a leaf is known; of an inner node, the worst of its leaves.
     pub known: f32,
+    /// Whether some leaf of it is next to surface for certain, or has a sheet.
+    pub sure: bool,
     /// The number of its sheet, and of its expansion.
     pub sheet: Option<u32>,
+}
+
+impl Node {
+    /// Whether surface runs through a leaf for certain, or along it.
+    pub(super) fn is_crossed(&self) -> bool {
+        f64::from(self.known) <= self.extent.diagonal() * (1.0 + 3.0 * MARGIN)
+    }
 }
 
 /// All boxes of a domain that may hold surface, by halves.
@@ -39,6 +54,8 @@ pub(super) struct Boxes {
     pub solid: Aabb,
     /// Whether some leaf has no sheet.
     pub rough: bool,
+    /// No less than how far the surface is from any point of those leaves without a sheet that are cut by searches.
+    pub widest: f64,
 }
 
 /// What became of one box of a level.
@@ -51,7 +68,8 @@ enum Fate {
 impl Boxes {
     /// Looks at the domain and all halves of what may hold surface, level by level.
     pub(super) fn build(tape: &Tape, domain: &Aabb, run: &Run<'_>) -> Result<Self> {
-        let mut boxes = Self { nodes: vec![node(*domain)], sheets: Vec::new(), taylors: Vec::new(), solid: Aabb::EMPTY, rough: false };
+        let mut boxes =
+            Self { nodes: vec![node(*domain)], sheets: Vec::new(), taylors: Vec::new(), solid: Aabb::EMPTY, rough: false, widest: 0.0 };
         let mut level = 0..1;
         for depth in 0..=LEVELS {
             let cells: Vec<Aabb> = boxes.nodes[level.clone()].iter().map(|node| node.extent).collect();
@@ -65,7 +83,7 @@ impl Boxes {
             let start = boxes.nodes.len();
             for (index, fate) in level.clone().zip(fates) {
                 let extent = boxes.nodes[index].extent;
-                let fate = if last && matches!(fate, Fate::Split) { Fate::Leaf(None, crossed(tape, &extent)) } else { fate };
+                let fate = if last && matches!(fate, Fate::Split) { Fate::Leaf(None, crossed(tape, domain, &extent)) } else { fate };
                 match fate {
                     Fate::Gone(Side::Outside) => boxes.nodes[index].known = f32::NAN,
                     Fate::Gone(Side::Inside) => {
@@ -75,7 +93,10 @@ impl Boxes {
                     Fate::Leaf(sheet, known) => {
                         boxes.solid = boxes.solid.union(extent);
                         boxes.rough |= sheet.is_none();
-                        boxes.nodes[index].known = known;
+                        (boxes.nodes[index].known, boxes.nodes[index].sure) = (known, known < f32::INFINITY || sheet.is_some());
+                        if sheet.is_none() && boxes.nodes[index].is_crossed() {
+                            boxes.widest = boxes.widest.max(f64::from(known));
+                        }
                         boxes.nodes[index].sheet = sheet.map(|sheet| {
                             let (taylor, sheet) = *sheet;
                             boxes.taylors.push(taylor);
@@ -106,8 +127,10 @@ impl Boxes {
             let Node { first, count, .. } = self.nodes[index];
             if count > 0 {
                 let children = first as usize..first as usize + usize::from(count);
-                let worst = self.nodes[children].iter().map(|child| child.known).fold(f32::NAN, f32::max);
-                self.nodes[index].known = worst;
+                let children = &self.nodes[children];
+                let worst = children.iter().map(|child| child.known).fold(f32::NAN, f32::max);
+                let sure = children.iter().any(|child| child.sure);
+                (self.nodes[index].known, self.nodes[index].sure) = (worst, sure);
             }
         }
         let old = std::mem::take(&mut self.nodes);
@@ -130,13 +153,14 @@ impl Boxes {
         }
     }
 
-    /// Refuses a domain without surface.
+    /// Refuses a domain without an inside.
     pub(super) fn checked(self, tape: &Tape, domain: &Aabb) -> Result<Self> {
         if self.nodes.is_empty() && self.solid == Aabb::EMPTY {
             let middle = tape.value(domain.center());
+            let how = if tape.over(domain).lower > 0.0 { "positive in all of" } else { "nowhere negative in" };
             return Err(Error::invalid(format!(
-                "the expression is positive in all of the domain ({middle:.3} in its middle), so it has no inside there; \
-                 give a domain around the shape"
+                "the expression is {how} the domain ({middle:.3} in its middle), so it has no inside there; \
+                 give a domain around the shape or, where the expression only touches zero, subtract a positive number from it"
             )));
         }
         Ok(self)
@@ -187,14 +211,16 @@ impl Boxes {
 }
 
 fn node(extent: Aabb) -> Node {
-    Node { extent, first: 0, count: 0, known: 0.0, sheet: None }
+    Node { extent, first: 0, count: 0, known: 0.0, sure: false, sheet: None }
 }
 
 fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
+    let touched = || Side::around(tape, domain, cell, MARGIN * cell.size().min_element());
     match Content::of(tape, cell) {
         Content::Nothing(side) => Fate::Gone(side),
+        Content::Open if let Some(side) = touched() => Fate::Gone(side),
         Content::Sheet(sheet) => {
-            let known = if sound(&sheet.1, domain) { 0.0 } else { crossed(tape, &sheet.1.extent) };
+            let known = if sound(&sheet.1, domain) { 0.0 } else { crossed(tape, domain, &sheet.1.extent) };
             Fate::Leaf(Some(sheet), known)
         }
         Content::Open => Fate::Split,
@@ -215,18 +241,45 @@ fn sound(sheet: &Sheet, domain: &Aabb) -> bool {
     along.length() - spread > 0.1 * whole.length()
 }
 
-/// No less than how far the surface is from any point of a box: its diagonal, where its corners are certainly not all on
-/// one side; infinite where they may be.
-fn crossed(tape: &Tape, cell: &Aabb) -> f32 {
-    let (mut inside, mut outside) = (false, false);
-    for p in (0..8).map(|corner| cell.corner(corner)).chain([cell.center()]) {
-        match Side::of(tape.certain(p)) {
-            Some(Side::Inside) => inside = true,
-            Some(Side::Outside) => outside = true,
-            None => {}
+/// No less than how far the surface is from any point of a box; infinite where it may be anywhere.
+///
+/// Where places of both sides are known, the surface is between them: in the box, or at most as far from it as it is wide.
+fn crossed(tape: &Tape, domain: &Aabb, cell: &Aabb) -> f32 {
+    let grown = |part: f64| Aabb::new((cell.min - cell.size() * part).max(domain.min), (cell.max + cell.size() * part).min(domain.max));
+    // On a face between two boxes, the surface may be a pole to both.
+    let within = [grown(MARGIN), grown(1.0)].into_iter().find(|within| has_both_sides(tape, within));
+    within.map_or(f32::INFINITY, |within| (within.diagonal() as f32).next_up())
+}
+
+/// Whether places of both sides are found in a box, some of them by the slope from a place next to a zero.
+fn has_both_sides(tape: &Tape, within: &Aabb) -> bool {
+    let place = |n: u32| DVec3::new(f64::from(n % 4), f64::from(n / 4 % 4), f64::from(n / 16)) / 3.0;
+    let places: [DVec3; 64] = std::array::from_fn(|n| (within.min + place(n as u32) * within.size()).min(within.max));
+    let mut values = [0.0; 64];
+    tape.values_into(&places, &mut values);
+    let finite = || (0..64).filter(|&n| values[n].is_finite());
+    let best = |sign: f64| finite().max_by(|&a, &b| (sign * values[a]).total_cmp(&(sign * values[b]))).unwrap_or(0);
+    let (low, high) = (best(-1.0), best(1.0));
+    let is = |p: DVec3, side: Side| Side::of(tape.certain(p)) == Some(side);
+    let (inside, outside) = (is(places[low], Side::Inside), is(places[high], Side::Outside));
+    if inside == outside {
+        return inside;
+    }
+    // All are on one side: beyond the one that is nearest to zero may be the other.
+    let (mut p, wanted) = if inside { (places[high], Side::Outside) } else { (places[low], Side::Inside) };
+    for _ in 0..BEYOND {
+        let jet = tape.jet::<0>(p);
+        let slope = DVec3::from_array(jet.gradient);
+        let step = slope * (-1.5 * jet.value / slope.length_squared());
+        p = (p + step).clamp(within.min, within.max);
+        if !p.is_finite() {
+            return false;
+        }
+        if is(p, wanted) {
+            return true;
         }
     }
-    if inside && outside { (cell.diagonal() as f32).next_up() } else { f32::INFINITY }
+    false
 }
 
 /// A box cut across its longer edges, in two, four or eight.

@@ -13,6 +13,9 @@ use crate::source::waiting::Waiting;
 /// Boxes that one search makes at most, beside those of the tree.
 const MOST: usize = 20_000;
 
+/// Of those, boxes without a sheet.
+const OPEN: usize = 2_000;
+
 /// Boxes of a search after which it is a hard one.
 const MANY: usize = 100;
 
@@ -79,6 +82,8 @@ pub(super) struct Search<'a> {
     /// Places by their squared lower bounds.
     heap: BinaryHeap<Waiting<Place>>,
     pieces: Vec<Piece>,
+    /// How many of them have no sheet.
+    open: usize,
     /// Squared: what was set aside is no nearer.
     floor: f64,
     upper: f64,
@@ -96,7 +101,7 @@ impl<'a> Search<'a> {
     pub(super) fn new(tape: &'a Tape, domain: &'a Aabb, boxes: &'a Boxes, accuracy: Accuracy, p: DVec3, side: Side, limit: f64) -> Self {
         let (heap, pieces, proven, feet) = (BinaryHeap::new(), Vec::new(), Vec::new(), Vec::new());
         let (floor, upper) = (f64::INFINITY, limit);
-        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, floor, upper, foot: None, proven, feet, first: None }
+        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, open: 0, floor, upper, foot: None, proven, feet, first: None }
     }
 
     /// Searches the tree from these nodes on.
@@ -110,11 +115,14 @@ impl<'a> Search<'a> {
             }
             // What is only a number of boxes says nothing itself, so that the answer does not depend on how boxes are grouped.
             if let Place::Node(index) = item {
-                self.open(index);
+                if self.tells(index, bound) {
+                    self.open(index);
+                }
                 continue;
             }
-            if bound >= self.floor || self.is_enough(bound) || self.pieces.len() > MOST {
+            if bound >= self.floor || self.is_enough(bound) || self.pieces.len() > MOST || self.open > OPEN {
                 self.floor = self.floor.min(bound);
+                self.reach(item);
                 continue;
             }
             match item {
@@ -165,7 +173,30 @@ impl<'a> Search<'a> {
                 Some(sheet) => boxes.taylors[*sheet as usize].rough(self.p, extent),
                 None => extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON),
             };
-            self.enter(bound, if *count == 0 { Place::Leaf(child) } else { Place::Node(child) });
+            if self.tells(child, bound) {
+                self.enter(bound, if *count == 0 { Place::Leaf(child) } else { Place::Node(child) });
+            }
+        }
+    }
+
+    /// Whether a node says anything new: beyond what was set aside, only surface that is known for certain does.
+    fn tells(&self, index: u32, bound: f64) -> bool {
+        bound < self.floor || self.boxes.nodes[index as usize].sure
+    }
+
+    /// How far the surface is at most, of which only that is still open.
+    fn reach(&mut self, item: Place) {
+        let Place::Leaf(index) = item else { return };
+        let node = &self.boxes.nodes[index as usize];
+        if node.sheet.is_none() && node.sure {
+            let far = (node.extent.distance_squared(self.p).sqrt() + f64::from(node.known)) * (1.0 + 8.0 * f64::EPSILON);
+            if far < self.upper {
+                (self.upper, self.foot) = (far, Some(node.extent.center()));
+            }
+        } else if let Some(sheet) = node.sheet.filter(|_| self.foot.is_none()) {
+            let (taylor, sheet) = (&self.boxes.taylors[sheet as usize], &self.boxes.sheets[sheet as usize]);
+            let near = taylor.least(self.p, &node.extent).1;
+            self.prove(sheet, near);
         }
     }
 
@@ -182,6 +213,8 @@ impl<'a> Search<'a> {
                     self.enter(bound, Place::Sheet(index, near));
                 }
             }
+            // What may touch zero without a change of sign would be cut for nothing, or in vain.
+            None if !node.is_crossed() => self.floor = self.floor.min(bound),
             None => self.settle(bound, &Piece { extent: node.extent, sheet: None, fresh: true }),
         }
     }
@@ -210,6 +243,12 @@ impl<'a> Search<'a> {
                     self.scan(extent);
                 }
                 self.floor = self.floor.min(bound);
+                return;
+            }
+            let extent = self.shaved(extent);
+            if extent != piece.extent {
+                let bound = bound.max(extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON));
+                self.add(bound, Piece { extent, ..*piece });
                 return;
             }
         }
@@ -245,9 +284,39 @@ impl<'a> Search<'a> {
                 bound = bound.max(least);
                 (taylor, sheet, near)
             });
-            self.pieces.push(Piece { extent, sheet, fresh: !piece.fresh });
-            self.enter(bound, Place::Piece((self.pieces.len() - 1) as u32));
+            self.add(bound, Piece { extent, sheet, fresh: !piece.fresh });
         }
+    }
+
+    fn add(&mut self, bound: f64, piece: Piece) {
+        self.open += usize::from(piece.sheet.is_none());
+        self.pieces.push(piece);
+        self.enter(bound, Place::Piece((self.pieces.len() - 1) as u32));
+    }
+
+    /// What is left of a box without those halves, next to the point, that have no surface.
+    fn shaved(&self, extent: &Aabb) -> Aabb {
+        let mut rest = *extent;
+        for axis in 0..3 {
+            let below = self.p[axis] < rest.min[axis];
+            if !below && self.p[axis] <= rest.max[axis] {
+                continue;
+            }
+            while rest.size()[axis] > 0.125 * self.accuracy.rough {
+                let middle = rest.center()[axis];
+                let (mut near, mut far) = (rest, rest);
+                if below {
+                    (near.max[axis], far.min[axis]) = (middle, middle);
+                } else {
+                    (near.min[axis], far.max[axis]) = (middle, middle);
+                }
+                if !matches!(Content::of(self.tape, &near), Content::Nothing(_)) {
+                    break;
+                }
+                rest = far;
+            }
+        }
+        rest
     }
 
     /// Whether a squared lower bound is as good as wanted.

@@ -74,7 +74,7 @@ impl Implicit {
     /// nearer, or the formula vanishes nowhere.
     pub fn foot(&self, p: DVec3) -> Option<DVec3> {
         let inner = p.clamp(self.domain.min, self.domain.max);
-        let side = Side::of(self.tape.certain(inner))?;
+        let side = self.side(inner)?;
         let found = self.search(p, side);
         found.foot.filter(|_| side == Side::Outside || p == inner)
     }
@@ -103,9 +103,14 @@ impl Implicit {
         }
         let around = Aabb::around(points.iter().copied());
         let center = around.center();
-        let side = Side::of(self.tape.certain(center.clamp(self.domain.min, self.domain.max)))?;
+        let side = self.side(center.clamp(self.domain.min, self.domain.max))?;
         let reach = self.search(center, side).upper + around.radius() * (1.0 + 1e-12) + self.accuracy.hard;
         Some(Near { leaves: self.boxes.leaves_near(&around, reach, LEAVES)?, reach })
+    }
+
+    /// The side of a point of the domain, where it is certain.
+    pub(super) fn side(&self, p: DVec3) -> Option<Side> {
+        Side::at(&self.tape, &self.domain, p)
     }
 
     pub(super) fn tape(&self) -> &Tape {
@@ -125,7 +130,7 @@ impl Implicit {
     fn direction(&self, p: DVec3) -> DVec3 {
         let inner = p.clamp(self.domain.min, self.domain.max);
         let slope = || self.tape.gradient(inner).normalize_or_zero();
-        let Some(side) = Side::of(self.tape.certain(inner)) else { return slope() };
+        let Some(side) = self.side(inner) else { return slope() };
         if side == Side::Inside && p != inner {
             return (p - inner).normalize_or_zero();
         }
@@ -157,7 +162,7 @@ impl Implicit {
         let inner = p.clamp(self.domain.min, self.domain.max);
         let apart = (p - inner).length();
         let rounding = 4.0 * f64::EPSILON * (p.abs().max_element() + inner.abs().max_element());
-        let Some(side) = Side::of(self.tape.certain(inner)) else {
+        let Some(side) = self.side(inner) else {
             let far = both_sides(&self.tape, &self.domain, inner, 0.0, None);
             // The side is not known, the value is as good as rounding allows.
             return if apart == 0.0 {
@@ -249,6 +254,6 @@ impl Source for Implicit {
     }
 
     fn noise(&self) -> f64 {
-        if self.boxes.rough { self.accuracy.rough } else { self.accuracy.hard }
+        if self.boxes.rough { self.accuracy.rough.max(self.boxes.widest) } else { self.accuracy.hard }
     }
 }

@@ -5,10 +5,13 @@ use super::matrix::{eigenvalues, middle_of};
 use super::number::Number;
 use super::tape::Tape;
 use super::taylor::Taylor;
-use crate::geom::{Aabb, Interval};
+use crate::geom::{Aabb, DVec3, Interval};
 
 /// In a sheet, gradients differ from their middle by no more than this part of it.
 const STEADY: f64 = 0.25;
+
+/// How far around a point its side is looked for, in sizes of the domain.
+const TOUCH: f64 = 1e-9;
 
 /// What derivatives say of the surface in a box.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +50,30 @@ impl Side {
             Some(Self::Inside)
         } else if value.lower > 0.0 {
             Some(Self::Outside)
+        } else {
+            None
+        }
+    }
+
+    /// The side of a point of `domain`, where it is certain.
+    ///
+    /// Where the formula is 0 and nowhere around it of the other sign, it only touches zero: that is no surface.
+    pub(super) fn at(tape: &Tape, domain: &Aabb, p: DVec3) -> Option<Self> {
+        let value = tape.certain(p);
+        Self::of(value).or_else(|| {
+            let touches = value.lower >= 0.0 || value.upper <= 0.0;
+            touches.then(|| Self::around(tape, domain, &Aabb::new(p, p), TOUCH * domain.diagonal())).flatten()
+        })
+    }
+
+    /// The side of all of a box, where the formula nowhere in it, nor within `margin` of it, has the other sign.
+    pub(super) fn around(tape: &Tape, domain: &Aabb, cell: &Aabb, margin: f64) -> Option<Self> {
+        let grown = cell.grow(margin);
+        let value = tape.over(&Aabb::new(grown.min.max(domain.min), grown.max.min(domain.max)));
+        if value.lower >= 0.0 {
+            Some(Self::Outside)
+        } else if value.upper <= 0.0 {
+            Some(Self::Inside)
         } else {
             None
         }
