@@ -26,6 +26,8 @@ pub(crate) struct Points {
     pub x: [f64; BLOCK],
     pub y: [f64; BLOCK],
     pub z: [f64; BLOCK],
+    /// How many differ; the others repeat them.
+    pub count: usize,
 }
 
 /// Squared distance and nearest triangle of every point of a block.
@@ -39,7 +41,7 @@ pub(crate) struct Answers {
 impl Points {
     /// The points of a block of at most 4 x 4 x 4; slots beyond a clipped block repeat its last points.
     pub fn of_block(lattice: &Grid, block: &Block) -> Self {
-        let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+        let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK], count: BLOCK };
         let at = |axis: usize, step: usize| (block.low[axis] + step as i64).min(block.high[axis] - 1);
         // Each coordinate depends on one index.
         let steps: [DVec3; 4] = std::array::from_fn(|step| lattice.corner(at(0, step), at(1, step), at(2, step)));
@@ -49,9 +51,9 @@ impl Points {
         points
     }
 
-    /// At least one and at most 64 points; slots beyond repeat the last.
+    /// At least one and at most 64 points; slots beyond repeat the last, and answers for them may be missing.
     pub fn of_some(some: &[DVec3]) -> Self {
-        let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK] };
+        let mut points = Self { x: [0.0; BLOCK], y: [0.0; BLOCK], z: [0.0; BLOCK], count: some.len() };
         for i in 0..BLOCK {
             let p = some[i.min(some.len() - 1)];
             (points.x[i], points.y[i], points.z[i]) = (p.x, p.y, p.z);
@@ -88,7 +90,7 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
     *out = Answers::NONE;
     if let [only] = list {
         let every: [u8; BLOCK] = std::array::from_fn(|i| i as u8);
-        return exact(tree, points, *only, &every, out);
+        return exact(tree, points, *only, &every[..points.count.min(BLOCK)], out);
     }
     let base = cell.center();
     let offsets: [Offsets<LANES>; PARTS] = std::array::from_fn(|part| {
@@ -97,13 +99,13 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
             DVec3::new(points.x[i], points.y[i], points.z[i]) - base
         })
     });
-    let rows = &mut rows.0;
+    let (rows, parts) = (&mut rows.0, points.count.div_ceil(LANES).min(PARTS));
     rows.clear();
     let mut least = [[f32::INFINITY; LANES]; PARTS];
     for &slot in list {
         let frame = tree.frame_at(slot);
         let mut row = [[0.0; LANES]; PARTS];
-        for part in 0..PARTS {
+        for part in 0..parts {
             frame.distances_squared::<F, LANES>(base, &offsets[part], &mut row[part]);
             for lane in 0..LANES {
                 least[part][lane] = if row[part][lane] < least[part][lane] { row[part][lane] } else { least[part][lane] };
@@ -114,31 +116,31 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
     // Both sides of a comparison may be off by the error.
     let error = filter_error(tree, cell) as f32;
     let (low, high) = ((window.lower * (1.0 - 1e-6)) as f32 - error, (window.upper * (1.0 + 1e-6)) as f32 + error);
-    for lane in least.as_flattened_mut() {
+    for lane in least[..parts].as_flattened_mut() {
         let distance = lane.sqrt();
         let reach = distance + 2.0 * error;
         let reach = reach * reach * (1.0 + 8.0 * f32::EPSILON);
         *lane = if (distance < low) | (distance > high) { -1.0 } else { reach };
     }
     for (&slot, row) in list.iter().zip(rows.iter()) {
-        exact_near::<F, PARTS>(tree, points, slot, row, &least, out);
+        exact_near::<F>(tree, points, slot, &row[..parts], &least[..parts], out);
     }
 }
 
 /// Offers a triangle to the points for which its filtered squared distance is not above a limit.
 #[inline(always)]
-pub(super) fn exact_near<F: Fuse, const N: usize>(
+pub(super) fn exact_near<F: Fuse>(
     tree: &Tree,
     points: &Points,
     slot: Slot,
-    squared: &[[f32; LANES]; N],
-    limits: &[[f32; LANES]; N],
+    squared: &[[f32; LANES]],
+    limits: &[[f32; LANES]],
     out: &mut Answers,
 ) {
     let mut chosen = [0u8; BLOCK + LANES];
     let mut count = 0;
-    for part in 0..N {
-        let mut mask = F::mask_not_above(&squared[part], &limits[part]);
+    for (part, (squared, limits)) in squared.iter().zip(limits).enumerate() {
+        let mut mask = F::mask_not_above(squared, limits);
         while mask != 0 {
             chosen[count] = (part * LANES) as u8 + mask.trailing_zeros() as u8;
             count += 1;

@@ -221,7 +221,7 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
     least[0][..CORNERS].fill(-1.0);
     least[1][NODES - LANES..].fill(-1.0);
     for (&slot, row) in list.iter().zip(rows.iter()) {
-        exact_near::<F, PARTS>(tree, points, slot, row, &least, answers);
+        exact_near::<F>(tree, points, slot, row, &least, answers);
     }
 }
 

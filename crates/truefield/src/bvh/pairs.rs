@@ -36,14 +36,7 @@ multiversion!(
 );
 
 #[inline(always)]
-fn offer_lists_body<F: Fuse>(
-    tree: &Tree,
-    points: &[DVec3],
-    order: &[Place],
-    triangles: &[u32],
-    groups: &[Group],
-    found: &mut [Candidate],
-) {
+fn offer_lists_body<F: Fuse>(tree: &Tree, points: &[DVec3], order: &[Place], triangles: &[u32], groups: &[Group], found: &mut [Candidate]) {
     for group in groups {
         for some in order[group.points.clone()].chunks(WIDTH) {
             let mut p = [[0.0; WIDTH]; 3];

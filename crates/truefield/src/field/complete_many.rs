@@ -1,6 +1,6 @@
 //! Many points of a complete field at once: those of one list together by the list, those without by the tree.
 
-use super::complete::{ABSENT, CellClass, CompleteField, Found};
+use super::complete::{ABSENT, CellClass, CompleteField, EDGE, Found, block_range};
 use crate::bvh::Candidate;
 use crate::bvh::order::{Curve, Place, along_own_curve, by_key, sort};
 use crate::bvh::pairs::{Group, Pair, offer, offer_lists};
@@ -45,14 +45,29 @@ impl CompleteField {
         answer: impl Fn(DVec3, Candidate, CellClass) -> T + Sync,
     ) -> Result<Vec<T>> {
         check_points(points)?;
-        let extent = self.grid().extent();
-        // Points beyond the cells come after the others, with their neighbours.
-        let curve = Curve::over(&extent.grow(extent.size().max_element()));
-        let key = |p| self.place_of(p).map_or_else(|| self.blocks.len() as u32 + (curve.place(p) >> COARSE), |(block, _)| block as u32);
+        let key = self.keys();
         by_key("query the field", points, run, key, |points| {
             let (found, classes) = self.search_many(points);
             points.iter().zip(found).zip(classes).map(|((&p, found), class)| answer(p, found, class)).collect()
         })
+    }
+
+    /// About the number of a point's block: near an edge of blocks it may be a neighbour's. Points beyond the cells come
+    /// after the others, with their neighbours.
+    fn keys(&self) -> impl Fn(DVec3) -> u32 + Sync {
+        let (extent, [_, ny, nz]) = (self.grid().extent(), self.block_shape().map(|n| n as u32));
+        let beyond = Curve::over(&extent.grow(extent.size().max_element()));
+        let (low, _) = block_range(self.grid());
+        let edge = EDGE as f64 * self.grid().spacing;
+        let (origin, scale) = (self.grid().origin + DVec3::from(low.map(|i| i as f64)) * edge, edge.recip());
+        let blocks = self.blocks.len() as u32;
+        move |p| {
+            if !extent.contains(p) {
+                return blocks + (beyond.place(p) >> COARSE);
+            }
+            let block = (p - origin) * scale;
+            (block.x as u32 * ny + block.y as u32) * nz + block.z as u32
+        }
     }
 
     /// Nearest triangles, and the classes of cells, of some thousand points.
