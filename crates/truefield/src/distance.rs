@@ -83,6 +83,15 @@ pub trait Source: Distance {
         Ok(())
     }
 
+    /// No less than what [`Source::gradients`] says at a point and the value's gradient differ by, where there is one;
+    /// infinite where that is not known, or the value there is not known within [`Source::noise`].
+    ///
+    /// The default is what closed forms are good to; differences, which their steps add to, are not counted.
+    fn tilt(&self, p: DVec3) -> f64 {
+        let _ = p;
+        1e-8
+    }
+
     /// Contains the distance minus the value at every point of the cell; ends may be infinite.
     fn slack(&self, cell: &Aabb) -> Interval {
         let _ = cell;

@@ -3,8 +3,7 @@
 use crate::distance::Source;
 use crate::geom::{Aabb, Affine, DVec3};
 
-/// What gradients may be off by, of their length; those that are differences, of the coordinates by which they step, too.
-const GRADIENT: f64 = 1e-8;
+/// By so much of the coordinates gradients step that are differences.
 const STEP: f64 = 1e-5;
 
 /// [`Distance::below`](crate::distance::Distance::below) of a shape, where its slope does not jump in the box, nor does its
@@ -31,7 +30,11 @@ fn tangent(shape: &dyn Source, cell: &Aabb) -> Option<Affine> {
     if radius > 0.0 && radius < STEP * size {
         return None;
     }
-    let off = radius * (GRADIENT + STEP * size * most.max(0.0)).min(2.0) + 2.0 * shape.noise_over(cell) + 8.0 * f64::EPSILON * size;
+    let tilt = shape.tilt(center);
+    if !tilt.is_finite() {
+        return None;
+    }
+    let off = radius * (tilt + STEP * size * most.max(0.0)).min(2.0) + 2.0 * shape.noise_over(cell) + 8.0 * f64::EPSILON * size;
     let value = value + slack.min(0.0) + 0.5 * bend.lower.min(0.0) * radius * radius - off;
     (value.is_finite() && slope.is_finite()).then_some(Affine { value, slope })
 }

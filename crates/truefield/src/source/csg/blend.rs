@@ -129,6 +129,11 @@ impl Source for Blend {
         Ok(())
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        // Noise moves the share of each, which changes no faster than what filling adds bends.
+        self.shapes[0].tilt(p).max(self.shapes[1].tilt(p)) + self.sharpest() * self.noise()
+    }
+
     /// Outside, from the blend's value to that of the union, which the blend contains.
     fn slack(&self, cell: &Aabb) -> Interval {
         let Some([a, b]) = self.middle(cell) else { return Interval::ALL };

@@ -94,6 +94,10 @@ impl Source for Complement {
         Ok(())
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        self.shape.tilt(p)
+    }
+
     fn slack(&self, cell: &Aabb) -> Interval {
         self.shape.slack(cell).negated()
     }

@@ -79,6 +79,10 @@ impl Source for Kept {
         Ok(())
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        self.shape.tilt(p)
+    }
+
     fn slack(&self, cell: &Aabb) -> Interval {
         let slack = self.shape.slack(cell);
         Interval { lower: slack.lower.min(0.0), upper: slack.upper.max(0.0) }

@@ -87,6 +87,10 @@ impl Source for Offset {
         self.shape.gradients(points, out)
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        self.shape.tilt(p)
+    }
+
     fn slack(&self, cell: &Aabb) -> Interval {
         let Some(value) = level::value(&*self.shape, cell.center()) else { return Interval::ALL };
         let radius = cell.radius() * (1.0 + 1e-9) + self.noise();

@@ -247,6 +247,10 @@ impl Source for Placed {
         Ok(())
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        self.shape.tilt(self.placement.inward(p))
+    }
+
     fn slack(&self, cell: &Aabb) -> Interval {
         self.scaled(self.shape.slack(&self.placement.inward_box(cell)))
     }

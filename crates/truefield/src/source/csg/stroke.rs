@@ -239,6 +239,10 @@ impl Source for Stroke {
         Ok(())
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        self.least(p).map_or(f64::INFINITY, |probe| self.tool.tilt(self.pose(probe.share).inward(p)))
+    }
+
     fn slack(&self, cell: &Aabb) -> Interval {
         let Some(value) = level::value(self, cell.center()) else { return Interval::ALL };
         if value > cell.radius() * (1.0 + 1e-9) + self.noise() {

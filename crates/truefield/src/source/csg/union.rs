@@ -269,6 +269,12 @@ impl Source for Union {
         Ok(())
     }
 
+    fn tilt(&self, p: DVec3) -> f64 {
+        let mut tilt = f64::INFINITY;
+        let found = self.each(&[p], |_, _, part| tilt = self.parts.get(part).map_or(f64::INFINITY, |part| part.tilt(p)));
+        if found.is_ok() { tilt } else { f64::INFINITY }
+    }
+
     fn slack(&self, cell: &Aabb) -> Interval {
         let Ok(Some(mut found)) = self.candidates(cell, usize::MAX / 2) else { return Interval::ALL };
         let first = least(&found);

@@ -37,14 +37,14 @@ pub(super) fn bend(shape: &Implicit, cell: &Aabb) -> Interval {
 }
 
 /// What is known of the middle of a cell.
-struct Middle {
+pub(super) struct Middle {
     /// Open where the surface runs through it.
-    side: Option<Side>,
+    pub side: Option<Side>,
     /// The surface is no nearer, and no farther.
-    near: f64,
-    far: f64,
+    pub near: f64,
+    pub far: f64,
     /// Where it seems nearest.
-    foot: DVec3,
+    pub foot: DVec3,
 }
 
 /// What is known where no point of a shape is nearer than `least`.
@@ -57,7 +57,7 @@ fn around_point(least: f64, side: Side) -> Interval {
 }
 
 /// Whether one and the same face of the domain is nearest in all of a cell.
-fn is_flat(shape: &Implicit, cell: &Aabb, center: DVec3, radius: f64) -> bool {
+pub(super) fn is_flat(shape: &Implicit, cell: &Aabb, center: DVec3, radius: f64) -> bool {
     let domain = shape.domain();
     let mut depths = [0.0; 6];
     for axis in 0..3 {
@@ -83,8 +83,9 @@ fn is_flat(shape: &Implicit, cell: &Aabb, center: DVec3, radius: f64) -> bool {
     domain.contains(cell.min)
 }
 
-fn smooth(shape: &Implicit, cell: &Aabb, middle: &Middle) -> Option<Interval> {
-    let (domain, center, radius) = (shape.domain(), cell.center(), cell.radius() * (1.0 + 1e-12));
+/// What is known around the feet of a cell whose points have one foot each, and the least and the greatest signed distance.
+pub(super) fn one_foot(shape: &Implicit, center: DVec3, radius: f64, middle: &Middle) -> Option<(Sheet, f64, f64)> {
+    let domain = shape.domain();
     let &Middle { side, near, far, foot } = middle;
     // The faces of the domain are not surface here.
     if side != Some(Side::Outside) && !(far + radius < shape.depth(center) - radius) {
@@ -111,6 +112,11 @@ fn smooth(shape: &Implicit, cell: &Aabb, middle: &Middle) -> Option<Interval> {
     if let Some(closer) = closer(shape, &sheet, multipliers, center, radius, foot) {
         sheet = Sheet::over(shape.tape(), &closer);
     }
+    Some((sheet, low, high))
+}
+
+fn smooth(shape: &Implicit, cell: &Aabb, middle: &Middle) -> Option<Interval> {
+    let (sheet, low, high) = one_foot(shape, cell.center(), cell.radius() * (1.0 + 1e-12), middle)?;
     let (least, most) = steepness(&sheet)?;
     let turns = sheet.turns;
     let curvature = Interval { lower: (turns.lower / least).min(turns.lower / most), upper: (turns.upper / least).max(turns.upper / most) };

@@ -13,6 +13,7 @@ mod shape;
 mod sheet;
 mod tape;
 mod taylor;
+mod tilt;
 
 pub use expression::{Binary, Expression, Unary};
 pub use shape::Implicit;

@@ -127,7 +127,7 @@ impl Implicit {
     }
 
     /// The direction in which the distance grows at `p`: away from the foot, or from the nearest face of the domain.
-    fn direction(&self, p: DVec3) -> DVec3 {
+    pub(super) fn direction(&self, p: DVec3) -> DVec3 {
         let inner = p.clamp(self.domain.min, self.domain.max);
         let slope = || self.tape.gradient(inner).normalize_or_zero();
         let Some(side) = self.side(inner) else { return slope() };
@@ -247,6 +247,10 @@ impl Source for Implicit {
 
     fn bend(&self, cell: &Aabb) -> Interval {
         super::bend::bend(self, cell)
+    }
+
+    fn tilt(&self, p: DVec3) -> f64 {
+        super::tilt::tilt(self, p)
     }
 
     fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
