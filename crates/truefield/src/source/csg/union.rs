@@ -42,6 +42,9 @@ struct Candidate {
 /// Up to so many parts are simply all asked.
 const FEW: usize = 4;
 
+/// So many points are worth asking all parts first which of them matter there.
+const SHARED: usize = 16;
+
 /// Points asked together, and the candidates up to which that pays.
 const GROUP: usize = 64;
 const TOGETHER: usize = 24;
@@ -117,7 +120,7 @@ impl Union {
         }
         let mut values = [0.0; GROUP];
         for (group, points) in points.chunks(GROUP).enumerate() {
-            let together = if self.parts.len() <= FEW {
+            let together = if self.parts.len() <= FEW && points.len() < SHARED {
                 Some((0..self.parts.len()).collect())
             } else if points.len() > 1 {
                 let found = self.candidates(&Aabb::around(points.iter().copied()), TOGETHER)?;

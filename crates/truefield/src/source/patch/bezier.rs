@@ -1,31 +1,11 @@
 //! One bicubic Bezier patch.
 
+use super::net::{Net, Point, bernstein};
 use crate::geom::{Aabb, DVec3};
 
 /// A bicubic patch: control points `[i][j]`, i along u and j along v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bezier(pub [[DVec3; 4]; 4]);
-
-/// A point of a patch and its derivatives there.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
-    pub at: DVec3,
-    pub u: DVec3,
-    pub v: DVec3,
-    pub uu: DVec3,
-    pub uv: DVec3,
-    pub vv: DVec3,
-}
-
-/// The cubic Bernstein polynomials at t, their first and their second derivatives.
-fn bernstein(t: f64) -> [[f64; 4]; 3] {
-    let s = 1.0 - t;
-    [
-        [s * s * s, 3.0 * t * s * s, 3.0 * t * t * s, t * t * t],
-        [-3.0 * s * s, 3.0 * s * (s - 2.0 * t), 3.0 * t * (2.0 * s - t), 3.0 * t * t],
-        [6.0 * s, 6.0 * (t - 2.0 * s), 6.0 * (s - 2.0 * t), 6.0 * t],
-    ]
-}
 
 impl Bezier {
     /// The point at (u, v).
@@ -41,19 +21,23 @@ impl Bezier {
     }
 
     pub(super) fn derivatives(&self, u: f64, v: f64) -> Point {
-        let (a, b) = (bernstein(u), bernstein(v));
-        let sum = |weights: &[f64; 4], points: &[DVec3; 4]| {
-            points[0] * weights[0] + points[1] * weights[1] + points[2] * weights[2] + points[3] * weights[3]
+        Net::new(self).derivatives([u, v])
+    }
+
+    /// What lies over the rectangle of this lower corner and size.
+    pub(super) fn part(&self, low: [f64; 2], size: [f64; 2]) -> Self {
+        let along = |rows: &Self, from: f64, to: f64| {
+            Self(rows.0.map(|[a, b, c, d]| {
+                let to_three = |[x, y, z]: [f64; 3]| {
+                    let (ab, bc, cd) = (a.lerp(b, x), b.lerp(c, x), c.lerp(d, x));
+                    let (abc, bcd) = (ab.lerp(bc, y), bc.lerp(cd, y));
+                    abc.lerp(bcd, z)
+                };
+                [[from, from, from], [from, from, to], [from, to, to], [to, to, to]].map(to_three)
+            }))
         };
-        let rows = [0, 1, 2].map(|order| self.0.map(|row| sum(&b[order], &row)));
-        Point {
-            at: sum(&a[0], &rows[0]),
-            u: sum(&a[1], &rows[0]),
-            v: sum(&a[0], &rows[1]),
-            uu: sum(&a[2], &rows[0]),
-            uv: sum(&a[1], &rows[1]),
-            vv: sum(&a[0], &rows[2]),
-        }
+        let across = along(&self.turned(), low[0], low[0] + size[0]).turned();
+        along(&across, low[1], low[1] + size[1])
     }
 
     /// The halves below and above the middle of u (axis 0) or v (axis 1).

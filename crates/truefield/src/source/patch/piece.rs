@@ -1,6 +1,7 @@
 //! A part of a patch, and how near it is for certain.
 
-use super::bezier::{Bezier, Point};
+use super::bezier::Bezier;
+use super::net::Point;
 use super::oriented::Oriented;
 use crate::geom::{Aabb, DVec3, Interval};
 
@@ -32,17 +33,37 @@ impl Piece {
         &self.hulls[0]
     }
 
+    pub(super) fn bezier(&self) -> &Bezier {
+        &self.bezier
+    }
+
+    /// Boxes of its points and derivatives, see [`Bezier::hulls`].
+    pub(super) fn hulls(&self) -> &[Aabb; 6] {
+        &self.hulls
+    }
+
+    /// Whether the edges across u, the lower and the upper, and those across v are one point each.
+    pub(super) fn point_edges(&self) -> [[bool; 2]; 2] {
+        let at = |i: usize, j: usize| self.bezier.0[i][j];
+        let is_point = |edge: [DVec3; 4]| edge.iter().all(|p| *p == edge[0]);
+        [[0, 3].map(|i| is_point([0, 1, 2, 3].map(|j| at(i, j)))), [0, 3].map(|j| is_point([0, 1, 2, 3].map(|i| at(i, j))))]
+    }
+
     /// A box along it.
     pub(super) fn oriented(&self) -> Oriented {
         let middle = self.bezier.derivatives(0.5, 0.5);
         Oriented::around(self.bezier.controls(), [middle.u, middle.v])
     }
 
+    /// The direction in which it is longer.
+    pub(super) fn longer(&self) -> usize {
+        let length = |hull: &Aabb| hull.min.abs().max(hull.max.abs()).length_squared();
+        usize::from(length(&self.hulls[2]) > length(&self.hulls[1]))
+    }
+
     /// Cut across the direction in which it is longer.
     pub(super) fn halves(&self) -> [Self; 2] {
-        let length = |hull: &Aabb| hull.min.abs().max(hull.max.abs()).length_squared();
-        let axis = usize::from(length(&self.hulls[2]) > length(&self.hulls[1]));
-        self.bezier.halves(axis).map(Self::new)
+        self.bezier.halves(self.longer()).map(Self::new)
     }
 
     /// The edges on which the nearest point to any point of a box lies, and no more than what half the squared distance bends

@@ -1,0 +1,288 @@
+//! The nearest point of patches, and the proof that none is nearer.
+//!
+//! The search goes down the tree, the nearest box first. Of a part over which the squared distance is certain to be convex,
+//! Newton's method finds the nearest point, and how much lower any other can be follows from the slope that is left. Parts of
+//! which that is not certain, next to collapsed edges or where much of the surface is as near, are taken apart at the end.
+
+use std::collections::BinaryHeap;
+
+use super::bends::{Convex, End};
+use super::piece::Piece;
+use super::tree::{NONE, PART, Part, Tree, WIDTH};
+use crate::geom::DVec3;
+use crate::simd::{Fuse, multiversion};
+use crate::source::waiting::Waiting;
+
+/// Newton steps of a part that is convex; mostly two or three are enough.
+const STEPS: usize = 12;
+
+/// Of what is asked for: beyond it, a step costs little and the answers are good to rounding.
+const GOAL: f64 = 1.0 / 64.0;
+
+/// Pieces that one search makes at most.
+const MOST: usize = 20_000;
+
+/// What waits at most: a tree of four billion patches is 16 nodes deep.
+const DEPTH: usize = 16 * WIDTH;
+
+/// The nearest point found, and lengths.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Foot {
+    /// No point is nearer.
+    pub lower: f64,
+    /// A point is no farther.
+    pub upper: f64,
+    /// Between both: the best guess.
+    pub value: f64,
+    pub point: DVec3,
+    /// Where it lies, if it was found in a convex part: the patch, u and v.
+    pub place: Option<(u32, [f64; 2])>,
+}
+
+/// The nearest point so far; lengths are squared.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    /// No point of what was looked at is nearer.
+    lower: f64,
+    /// A point is no farther.
+    upper: f64,
+    /// Between both: the best guess.
+    square: f64,
+    point: DVec3,
+    place: Option<(u32, [f64; 2])>,
+}
+
+multiversion!(
+    /// The nearest point, its distance to `accuracy` wherever the search can be brought to an end.
+    pub(super) fn nearest(tree: &Tree, p: DVec3, accuracy: f64) -> Foot = nearest_body
+);
+
+#[inline(always)]
+fn nearest_body<F: Fuse>(tree: &Tree, p: DVec3, accuracy: f64) -> Foot {
+    let mut best = Found { lower: f64::INFINITY, upper: f64::INFINITY, square: f64::INFINITY, point: DVec3::NAN, place: None };
+    let mut rest = Vec::new();
+    let mut stack = [(0.0, 0); DEPTH];
+    (stack[0].1, stack[0].0) = (tree.root, 0.0);
+    let mut height = 1;
+    while height > 0 {
+        height -= 1;
+        let (bound, item) = stack[height];
+        if bound >= best.upper {
+            continue;
+        }
+        let (mut least, mut node) = (bound, item);
+        if item & PART != 0 {
+            let part = &tree.parts[(item & !PART) as usize];
+            least = least.max(part.oriented.distance_squared(p));
+            if least >= best.upper {
+                continue;
+            }
+            if let Some(convex) = part.bends.convex(p, DVec3::ZERO) {
+                if part.is_above_tangent(p, best.upper) || newton(tree, part, p, [None; 2], &convex, accuracy * GOAL, &mut best) {
+                    continue;
+                }
+            } else {
+                best.see(part.middle.at, p);
+            }
+            if part.node == NONE {
+                if let Some((ends, convex)) = part.bends.at_edge(p, DVec3::ZERO)
+                    && newton(tree, part, p, ends, &convex, accuracy * GOAL, &mut best)
+                {
+                    continue;
+                }
+                rest.push((least, item & !PART));
+                continue;
+            }
+            node = part.node;
+        }
+        let node = &tree.nodes[node as usize];
+        let squared = node.distances_squared(p);
+        let first = height;
+        for lane in 0..WIDTH {
+            let bound = squared[lane].max(least);
+            if bound < best.upper {
+                // The nearest on top.
+                let mut place = height;
+                while place > first && stack[place - 1].0 < bound {
+                    stack[place] = stack[place - 1];
+                    place -= 1;
+                }
+                stack[place] = (bound, node.children[lane]);
+                height += 1;
+            }
+        }
+    }
+    best.lower = best.lower.min(best.upper);
+    rest.retain(|(bound, _)| *bound < best.upper);
+    if !rest.is_empty() {
+        take_apart(tree, p, accuracy, &rest, &mut best);
+    }
+    let rounding = 64.0 * f64::EPSILON * (p.abs().max_element() + tree.size);
+    let lower = (best.lower.max(0.0).sqrt() - rounding).max(0.0);
+    Foot { lower, upper: best.upper.sqrt() + rounding, value: best.square.sqrt(), point: best.point, place: best.place }
+}
+
+impl Found {
+    /// Takes a point of the patches into account.
+    #[inline(always)]
+    fn see(&mut self, point: DVec3, p: DVec3) {
+        let square = (point - p).length_squared();
+        self.upper = self.upper.min(square);
+        if square < self.square {
+            (self.square, self.point, self.place) = (square, point, None);
+        }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, other: &Self) {
+        let (lower, upper) = (self.lower.min(other.lower), self.upper.min(other.upper));
+        if other.square < self.square {
+            *self = *other;
+        }
+        (self.lower, self.upper) = (lower, upper);
+    }
+}
+
+/// Newton's method over a part that is convex as seen from `p`, or over the ends at which the nearest point lies; whether the
+/// goal was reached, or nothing nearer is there.
+#[inline(always)]
+fn newton(tree: &Tree, part: &Part, p: DVec3, ends: [Option<End>; 2], convex: &Convex, goal: f64, best: &mut Found) -> bool {
+    let net = &tree.nets[part.patch as usize];
+    let size = p.abs().max(part.middle.at.abs()).max_element();
+    let (mut low, mut high) = (part.low, part.high);
+    for k in 0..2 {
+        match ends[k] {
+            Some(End::Low) => high[k] = low[k],
+            Some(End::High) => low[k] = high[k],
+            None => {}
+        }
+    }
+    let mut t = part.start(p, low, high);
+    for _ in 0..STEPS {
+        let here = net.derivatives(t);
+        let way = here.at - p;
+        let square = way.length_squared();
+        let lengths = [here.u.length(), here.v.length()];
+        let slope = [way.dot(here.u), way.dot(here.v)];
+        let held: [bool; 2] = std::array::from_fn(|k| t[k] <= low[k] && slope[k] >= 0.0 || t[k] >= high[k] && slope[k] <= 0.0);
+        // Way and derivatives are rounded.
+        let noise = 32.0 * f64::EPSILON * (size + way.abs().max_element());
+        let left: [f64; 2] = std::array::from_fn(|k| if held[k] { 0.0 } else { slope[k].abs() } + noise * lengths[k]);
+        let fall = 2.0 * convex.fall(left);
+        if square - fall >= best.upper {
+            return true;
+        }
+        let bend = [lengths[0] * lengths[0] + way.dot(here.uu), lengths[1] * lengths[1] + way.dot(here.vv)];
+        let mixed = here.u.dot(here.v) + way.dot(here.uv);
+        let step = step(slope, bend, mixed, held, std::array::from_fn(|k| [low[k] - t[k], high[k] - t[k]]));
+        let far = square.sqrt();
+        if far <= goal || fall <= goal * (2.0 * far - goal) {
+            let lower = (square - fall).max(0.0);
+            // One more step, by the derivatives that are known.
+            let [s, r] = step;
+            let change = 2.0 * (slope[0] * s + slope[1] * r) + bend[0] * s * s + 2.0 * mixed * s * r + bend[1] * r * r;
+            let point = here.at + (here.u * s + here.v * r) + (here.uu * (0.5 * s * s) + here.uv * (s * r) + here.vv * (0.5 * r * r));
+            let place = [t[0] + s, t[1] + r];
+            let square_there = (square + change).clamp(lower, square);
+            best.take(&Found { lower, upper: square, square: square_there, point, place: Some((part.patch, place)) });
+            return true;
+        }
+        let next: [f64; 2] = std::array::from_fn(|k| (t[k] + step[k]).clamp(low[k], high[k]));
+        if next == t {
+            return false;
+        }
+        t = next;
+    }
+    false
+}
+
+/// Newton's step within a rectangle, where what is held stays.
+#[inline(always)]
+fn step(slope: [f64; 2], bend: [f64; 2], mixed: f64, held: [bool; 2], room: [[f64; 2]; 2]) -> [f64; 2] {
+    let within = |k: usize, step: f64| step.max(room[k][0]).min(room[k][1]);
+    let alone = |k: usize, other: f64| within(k, -(slope[k] + mixed * other) / bend[k]);
+    match held {
+        [true, true] => [0.0; 2],
+        [true, false] => [0.0, alone(1, 0.0)],
+        [false, true] => [alone(0, 0.0), 0.0],
+        [false, false] => {
+            let inverse = 1.0 / (bend[0] * bend[1] - mixed * mixed);
+            let both = [(mixed * slope[1] - bend[1] * slope[0]) * inverse, (mixed * slope[0] - bend[0] * slope[1]) * inverse];
+            let kept = [within(0, both[0]), within(1, both[1])];
+            if kept[0] != both[0] {
+                [kept[0], alone(1, kept[0])]
+            } else if kept[1] != both[1] {
+                [alone(0, kept[1]), kept[1]]
+            } else {
+                kept
+            }
+        }
+    }
+}
+
+impl Part {
+    /// Whether all of a convex part is certainly no nearer than `least`, squared: it lies above its tangent in the middle.
+    #[inline(always)]
+    fn is_above_tangent(&self, p: DVec3, least: f64) -> bool {
+        let middle = &self.middle;
+        let way = middle.at - p;
+        let fall = way.dot(middle.u).abs() * (self.high[0] - self.low[0]) + way.dot(middle.v).abs() * (self.high[1] - self.low[1]);
+        let noise = 64.0 * f64::EPSILON * (p.abs().max_element() + middle.at.abs().max_element()) * (way.length() + self.reach);
+        way.length_squared() - fall - noise >= least
+    }
+
+    /// Where Newton's method starts: after one step from the middle.
+    #[inline(always)]
+    fn start(&self, p: DVec3, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
+        let middle = &self.middle;
+        let way = middle.at - p;
+        let slope = [way.dot(middle.u), way.dot(middle.v)];
+        let bend = [middle.u.length_squared() + way.dot(middle.uu), middle.v.length_squared() + way.dot(middle.vv)];
+        let mixed = middle.u.dot(middle.v) + way.dot(middle.uv);
+        let center = [0.5 * (self.low[0] + self.high[0]), 0.5 * (self.low[1] + self.high[1])];
+        let room = [[low[0] - center[0], high[0] - center[0]], [low[1] - center[1], high[1] - center[1]]];
+        let step = step(slope, bend, mixed, [false; 2], room);
+        // Not beyond the ends by rounding.
+        [(center[0] + step[0]).clamp(low[0], high[0]), (center[1] + step[1]).clamp(low[1], high[1])]
+    }
+}
+
+/// Goes on with parts that no bound decided, halving them, the nearest first.
+#[inline(never)]
+fn take_apart(tree: &Tree, p: DVec3, accuracy: f64, rest: &[(f64, u32)], best: &mut Found) {
+    let reached = |bound: f64, upper: f64| bound.sqrt() >= upper.sqrt() - accuracy;
+    let mut heap: BinaryHeap<_> =
+        rest.iter().enumerate().map(|(number, &(bound, part))| Waiting { bound, number, item: Waits::Part(part) }).collect();
+    let mut pieces: Vec<Piece> = Vec::new();
+    let mut lower = f64::INFINITY;
+    while let Some(Waiting { bound, item, .. }) = heap.pop() {
+        if reached(bound, best.upper) || pieces.len() > MOST {
+            lower = lower.min(bound);
+            break;
+        }
+        let piece = match item {
+            Waits::Part(part) => &tree.piece(&tree.parts[part as usize]),
+            Waits::Piece(piece) => &pieces[piece],
+        };
+        let found = piece.nearest(p);
+        best.see(found.point, p);
+        if reached(found.lower.max(0.0), best.upper) {
+            lower = lower.min(found.lower);
+            continue;
+        }
+        for half in piece.halves() {
+            let bound = (half.extent().distance_squared(p) * (1.0 - 8.0 * f64::EPSILON)).max(found.lower).max(bound);
+            heap.push(Waiting { bound, number: rest.len() + pieces.len(), item: Waits::Piece(pieces.len()) });
+            pieces.push(half);
+        }
+    }
+    best.lower = best.lower.min(lower);
+    best.square = best.square.clamp(best.lower, best.upper);
+}
+
+/// What is still to be taken apart.
+#[derive(Clone, Copy, Debug)]
+enum Waits {
+    Part(u32),
+    Piece(usize),
+}
