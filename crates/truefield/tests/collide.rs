@@ -1,14 +1,16 @@
 //! Collision: intervals that contain the truth, witnesses where they should be.
 
+mod nasty;
 mod shaped;
 
 use std::sync::Arc;
 
+use nasty::shapes;
 use shaped::{ball, box_value, cuboid, near, torus, tree};
 use truefield::laws::{Random, check_threads};
 use truefield::product::collide::{Collision, Contact, collide};
 use truefield::source::csg::{Sphere, intersection};
-use truefield::{Aabb, DVec3, Distance, Error, Interval, Run, Source};
+use truefield::{Aabb, DVec3, Distance, Error, Interval, Run, SignChoice, Source, Surface};
 
 const PLENTY: usize = 200_000;
 
@@ -137,4 +139,48 @@ fn nothing_is_never_met() {
     assert_ne!(found.contact, Contact::Penetrating);
     let found = collide(&other, &nothing, 0.1, 20_000, &Run::default()).expect("an answer");
     assert_ne!(found.contact, Contact::Penetrating);
+}
+
+/// What is inside is told by winding numbers: it ends where nothing is drawn, and a way to it may go through an opening.
+#[test]
+fn open_meshes_are_as_near_as_their_inside() {
+    let holed = |soup: Vec<[DVec3; 3]>, keep: &dyn Fn(DVec3) -> bool| -> Vec<[DVec3; 3]> {
+        soup.into_iter().filter(|t| keep((t[0] + t[1] + t[2]) / 3.0)).collect()
+    };
+    let solids = [
+        ("a bowl", holed(shapes::icosphere(2), &|p| p.z < 0.3)),
+        ("half a ball", holed(shapes::icosphere(2), &|p| p.x < 0.0)),
+        ("a box without a lid", holed(shapes::cuboid(DVec3::splat(-1.0), DVec3::ONE), &|p| p.z < 0.99)),
+        ("a ring with a gap", holed(shapes::torus(24, 12, 1.0, 0.3), &|p| p.x < 0.8)),
+    ];
+    let mut random = Random::new(5);
+    let (mut apart, mut together) = (0, 0);
+    for (what, soup) in solids {
+        let mesh = Arc::new(shapes::welded(&soup));
+        let surface = Surface::new(mesh.clone(), SignChoice::Auto, &Run::with_threads(2)).expect("a surface");
+        let room = mesh.extent().grow(0.2);
+        let place = |random: &mut Random| room.min + room.size() * DVec3::new(random.unit(), random.unit(), random.unit());
+        let cloud: Vec<DVec3> = (0..60_000).map(|_| place(&mut random)).collect();
+        let bounds = surface.bounds(&cloud, &Run::with_threads(2)).expect("bounds");
+        let inside: Vec<DVec3> = cloud.iter().zip(&bounds).filter(|(_, b)| b.upper < 0.0).map(|(&p, _)| p).collect();
+        assert!(inside.len() > 500, "{what}: {}", inside.len());
+        for _ in 0..60 {
+            let (center, radius) = (place(&mut random) * random.between(0.2, 2.0), random.between(0.02, 0.5));
+            let c = collide(&surface, &ball(center, radius), 0.02, 3000, &Run::with_threads(2)).expect("an answer");
+            let nearest = inside.iter().map(|q| (*q - center).length()).fold(f64::INFINITY, f64::min) - radius;
+            assert!(c.separation.lower <= nearest.max(0.0), "{what}, ball of {radius} at {center}: {c:?}, {nearest}");
+            match c.contact {
+                Contact::Separated => {
+                    apart += 1;
+                    assert!(nearest > 0.0, "{what}, ball of {radius} at {center}: {c:?}");
+                }
+                Contact::Penetrating => {
+                    together += 1;
+                    assert!(surface.at(c.first).lower < 0.0 && (c.first - center).length() < radius, "{what}: {c:?}");
+                }
+                Contact::Undecided => {}
+            }
+        }
+    }
+    assert!(apart > 40 && together > 20, "{apart} apart, {together} together");
 }
