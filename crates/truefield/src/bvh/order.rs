@@ -67,8 +67,10 @@ pub(crate) fn by_key<T: Copy + Send + Sync>(
     })?;
     let pieces = pieces(&runs, points.len());
     let answers = run.blocks(phase, pieces.len(), |piece| {
-        let fetched: Vec<DVec3> =
-            runs.iter().zip(&pieces[piece]).flat_map(|(run, part)| run[part.clone()].iter().map(|&(_, i)| points[i as usize])).collect();
+        let mut fetched = Vec::with_capacity(pieces[piece].iter().map(|part| part.len()).sum());
+        for (run, part) in runs.iter().zip(&pieces[piece]) {
+            fetched.extend(run[part.clone()].iter().map(|&(_, i)| points[i as usize]));
+        }
         Ok(answer(&fetched))
     })?;
     let Some(&any) = answers.first().and_then(|piece| piece.first()) else { return Ok(Vec::new()) };
