@@ -182,7 +182,7 @@ fn face(corners: &[DVec3; 3]) -> Pseudonormal {
     if length == 0.0 {
         return Pseudonormal::default();
     }
-    Pseudonormal { sum: cross / length, error: 8.0 * UNIT * (ab.length() * ac.length() / length + 1.0) }
+    Pseudonormal { sum: cross / length, error: 8.0 * UNIT * ((ab.length_squared() * ac.length_squared()).sqrt() / length + 1.0) }
 }
 
 /// Distance from the nearest point to the edges of its triangle that do not contain its feature.
@@ -196,9 +196,11 @@ fn reach(corners: &[DVec3; 3], nearest: &FacetPoint) -> f64 {
         .filter(|&edge| counts(edge))
         .map(|edge| {
             let (from, to) = (corners[usize::from(edge)], corners[usize::from(edge + 1) % 3]);
-            (to - from).cross(nearest.point - from).length() / (to - from).length()
+            // One root of the least is quicker than a root for each.
+            (to - from).cross(nearest.point - from).length_squared() / (to - from).length_squared()
         })
         .fold(f64::INFINITY, f64::min)
+        .sqrt()
 }
 
 /// How far a nearest point may be off, for points within the box of the mesh.
