@@ -37,7 +37,7 @@ def slab() -> Image.Image:
 def vase() -> Image.Image:
     """A vase of revolution, hollow, with waves carved around it."""
     outside = csg.ellipsoid((1.0, 1.0, 1.4)).blend(csg.cylinder(0.45, 3.6), 0.35)
-    solid = (outside & csg.box((4, 4, 3.2))) - outside.offset(-0.1).translate((0, 0, 0.12))
+    solid = (outside & csg.box((4, 4, 3.2))) - outside.offset(-0.18).translate((0, 0, 0.12))
     field = tf.adaptive_field(solid, 6e-3, growth=0.2, rule="samples")
     turn = np.linspace(0, 2 * np.pi, 361)
     for height in np.linspace(-0.8, 0.8, 9):
@@ -110,7 +110,7 @@ def levels() -> Image.Image:
         coarse = field.level_of_detail(tolerance=tolerance)
         tile = coarse.render(size=half, samples=9)
         says = f"error {tolerance:g}, {coarse.statistics()['leaves']} leaves"
-        ImageDraw.Draw(tile).text((12, 8), says, fill=(60, 66, 74), font=lettering.font(15))
+        ImageDraw.Draw(tile).text((12, SIZE[1] - 70), says, fill=(60, 66, 74), font=lettering.font(15))
         page.paste(tile, (place * half[0], 0))
     return page
 
