@@ -34,6 +34,9 @@ const FITS: usize = 6;
 /// Balls that lead from a point off the surface until its triangles say on which side that is.
 const STEPS: usize = 64;
 
+/// How far ahead a larger ball is looked for, in errors of the triangles.
+const AHEAD: f64 = 4.0;
+
 /// Triangles next to closed patches, and balls between both.
 #[derive(Debug)]
 pub(super) struct Sided {
@@ -144,8 +147,16 @@ impl Sided {
             if found.lower <= self.accuracy {
                 return None;
             }
-            // Within the ball there is no surface: all of it is on one side.
-            at += (at - found.point).normalize_or_zero() * (0.99 * found.lower);
+            // Within a ball there is no surface: all of it is on one side. Straight to where triangles decide if the ball there
+            // overlaps, else within this one.
+            let way = (at - found.point).normalize_or_zero();
+            let ahead = at + way * (AHEAD * self.error);
+            let next = search(ahead);
+            if overlap(at, &found, ahead, next.lower) && next.lower > self.error {
+                (at, found) = (ahead, next);
+                continue;
+            }
+            at += way * (0.99 * found.lower);
             let next = search(at);
             if next.lower <= found.lower {
                 return None;
@@ -159,10 +170,14 @@ impl Sided {
         let (patch, place) = found.place?;
         let [i, j] = place.map(|t| ((t * BALLS as f64) as usize).min(BALLS - 1));
         let pair = self.balls.get((patch as usize * BALLS + i) * BALLS + j)?;
-        // Rounding of both radii is taken off them; that of the way between is less.
-        let overlaps = |ball: &&Ball| p.distance(ball.center) < (found.lower + ball.radius) * (1.0 - 1e-12);
-        pair.iter().find(overlaps).map(|ball| ball.side)
+        pair.iter().find(|ball| overlap(p, found, ball.center, ball.radius)).map(|ball| ball.side)
     }
+}
+
+/// Whether the ball around a point that holds no surface overlaps another one.
+fn overlap(p: DVec3, found: &Foot, center: DVec3, radius: f64) -> bool {
+    // Rounding is taken off both radii; that of the way between is less.
+    p.distance(center) < (found.lower + radius) * (1.0 - 1e-12)
 }
 
 /// Points of several patches that are one but for rounding.

@@ -77,6 +77,7 @@ impl Patches {
         let square = reach * reach * (1.0 + 1e-12);
         let near = |extent: &Aabb| (extent.min - cell.max).max(cell.min - extent.max).max(DVec3::ZERO).length_squared() <= square;
         let (center, spread) = (cell.center(), 0.5 * cell.size() * (1.0 + 1e-12));
+        let beyond = (reach + cell.radius()).powi(2) * (1.0 + 1e-12);
         let mut pending = vec![self.tree.root];
         let mut halves: Vec<(Piece, u32)> = Vec::new();
         while let Some(node) = pending.pop() {
@@ -86,13 +87,13 @@ impl Patches {
                     continue;
                 }
                 let part = &self.tree.parts[(child & !PART) as usize];
-                if part.bends.convex(center, spread).is_some() {
+                if part.oriented.distance_squared(center) > beyond || part.bends.convex(center, spread).is_some() {
                     continue;
                 }
-                if part.node == NONE {
-                    halves.push((self.tree.piece(part), FINER));
-                } else {
+                if part.node != NONE {
                     pending.push(part.node);
+                } else if part.bends.at_edge(center, spread).is_none() {
+                    halves.push((self.tree.piece(part), FINER));
                 }
             }
             while let Some((piece, levels)) = halves.pop() {
