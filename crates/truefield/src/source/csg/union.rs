@@ -286,8 +286,8 @@ impl Source for Union {
                 found.push(Candidate { part: part as usize, value: f64::INFINITY });
             }
         }
-        let slacks = found.iter().map(|candidate| self.parts[candidate.part].slack(cell));
-        let Interval { lower, upper } = slacks.fold(Interval::exact(0.0), Interval::hull);
+        let slacks: Vec<Interval> = found.iter().map(|candidate| self.parts[candidate.part].slack(cell)).collect();
+        let Interval { lower, upper } = slacks.iter().copied().fold(Interval::exact(0.0), Interval::hull);
         let radius = cell.radius() * (1.0 + 1e-12) + self.noise;
         if first.value + if self.sided() { 0.0 } else { lower } > radius {
             return Interval { lower, upper };
@@ -297,8 +297,11 @@ impl Source for Union {
         }
         let exact = |part: usize, cell: &Aabb| self.parts[part].slack(cell) == Interval::exact(0.0);
         // No other part comes as near as the surface of the deepest one.
-        if exact(first.part, cell) && self.alone(first.part, cell.center(), (radius - first.value).max(0.0) + radius) {
-            return Interval::exact(0.0);
+        let deepest = found.iter().zip(&slacks).find(|(candidate, _)| candidate.part == first.part).map(|(_, slack)| *slack);
+        if let Some(slack) = deepest.filter(|slack| slack.width() <= radius)
+            && self.alone(first.part, cell.center(), (radius - first.value).max(0.0) + radius + slack.upper.max(-slack.lower))
+        {
+            return slack;
         }
         let unit = |cell: &Aabb| {
             self.candidates(cell, MANY).is_ok_and(|found| found.is_some_and(|found| found.iter().all(|found| exact(found.part, cell))))

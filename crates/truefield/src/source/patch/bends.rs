@@ -59,17 +59,14 @@ impl Bends {
         let squares = half_squares(piece.bezier(), center);
         // What rounding did to differences of them.
         let rounding = 1e-12 * squares.as_flattened().iter().fold(0.0_f64, |most, square| most.max(square.abs()));
-        let range = |rows: usize, columns: usize, of: &dyn Fn(usize, usize) -> f64| {
-            let values = (0..rows * columns).map(|k| of(k / columns, k % columns));
-            let range = values.fold(NOTHING, |range, value| range.hull(Interval::exact(value)));
-            range.widen(rounding)
-        };
-        let f = |i: usize, j: usize| squares[i][j];
-        let of_u = range(6, 7, &|i, j| 6.0 * (f(i + 1, j) - f(i, j)));
-        let of_v = range(7, 6, &|i, j| 6.0 * (f(i, j + 1) - f(i, j)));
-        let of_uu = range(5, 7, &|i, j| 30.0 * (f(i + 2, j) - 2.0 * f(i + 1, j) + f(i, j)));
-        let of_vv = range(7, 5, &|i, j| 30.0 * (f(i, j + 2) - 2.0 * f(i, j + 1) + f(i, j)));
-        let of_uv = range(6, 6, &|i, j| 36.0 * (f(i + 1, j + 1) - f(i + 1, j) - f(i, j + 1) + f(i, j)));
+        let f = &squares;
+        let [of_u, of_v, of_uu, of_vv, of_uv] = [
+            range::<6, 7>(rounding, |i, j| 6.0 * (f[i + 1][j] - f[i][j])),
+            range::<7, 6>(rounding, |i, j| 6.0 * (f[i][j + 1] - f[i][j])),
+            range::<5, 7>(rounding, |i, j| 30.0 * (f[i + 2][j] - 2.0 * f[i + 1][j] + f[i][j])),
+            range::<7, 5>(rounding, |i, j| 30.0 * (f[i][j + 2] - 2.0 * f[i][j + 1] + f[i][j])),
+            range::<6, 6>(rounding, |i, j| 36.0 * (f[i + 1][j + 1] - f[i + 1][j] - f[i][j + 1] + f[i][j])),
+        ];
         // The piece's own derivatives are by its own rectangle, from 0 to 1.
         let [x, y] = size.map(|size| 1.0 / size);
         let span = |hull: &Aabb, scale: f64| Span {
@@ -90,13 +87,31 @@ impl Bends {
     /// For all points that are no farther from `p`, along each axis, than `spread`, if it is certain to be convex.
     #[inline(always)]
     pub fn convex(&self, p: DVec3, spread: DVec3) -> Option<Convex> {
+        let [uu, vv, mixed] = self.seen_from(p, spread);
+        let determinant = uu * vv - mixed * mixed;
+        (uu > 0.0 && vv > 0.0 && determinant > CONDITION * (uu * vv)).then_some(Convex { uu, vv, mixed, determinant })
+    }
+
+    /// The least along u u and v v, and the most along u v.
+    #[inline(always)]
+    fn seen_from(&self, p: DVec3, spread: DVec3) -> [f64; 3] {
         let q = p - self.center;
         let aside = q.abs() + spread;
         let [u, mixed, v] = &self.second;
-        let (uu, vv) = (self.least[0] - u.most(q, spread, aside), self.least[1] - v.most(q, spread, aside));
-        let mixed = self.most + mixed.most(q, spread, aside).max(-mixed.least(q, spread, aside));
-        let determinant = uu * vv - mixed * mixed;
-        (uu > 0.0 && vv > 0.0 && determinant > CONDITION * (uu * vv)).then_some(Convex { uu, vv, mixed, determinant })
+        [
+            self.least[0] - u.most(q, spread, aside),
+            self.least[1] - v.most(q, spread, aside),
+            self.most + mixed.most(q, spread, aside).max(-mixed.least(q, spread, aside)),
+        ]
+    }
+
+    /// How far the squared distance to `p` may be below its tangent in the middle of the rectangle.
+    pub fn droop(&self, p: DVec3, size: [f64; 2]) -> f64 {
+        let [uu, vv, mixed] = self.seen_from(p, DVec3::ZERO);
+        let [x, y] = size.map(|size| 0.5 * size);
+        // What is convex along u and along v balances that much of the rest.
+        let rest = (mixed - (uu.max(0.0) * vv.max(0.0)).sqrt()).max(0.0);
+        ((-uu).max(0.0) * x * x + (-vv).max(0.0) * y * y + 2.0 * rest * x * y) * (1.0 + 1e-12)
     }
 
     /// The ends at which the nearest points lie, where along u, along v or along both the distance only grows or only falls,
@@ -164,11 +179,29 @@ fn half_squares(bezier: &Bezier, center: DVec3) -> [[f64; 7]; 7] {
     let weighed: [[DVec3; 4]; 4] =
         std::array::from_fn(|i| std::array::from_fn(|j| (bezier.0[i][j] - center) * (OF_THREE[i] * OF_THREE[j])));
     let mut sums = [[0.0; 7]; 7];
-    for (i, j, k, l) in (0..256).map(|n| (n / 64, n / 16 % 4, n / 4 % 4, n % 4)) {
-        sums[i + k][j + l] += weighed[i][j].dot(weighed[k][l]);
+    for i in 0..4 {
+        for k in 0..=i {
+            // Rows come in pairs.
+            let times = if i == k { 1.0 } else { 2.0 };
+            for j in 0..4 {
+                let first = weighed[i][j] * times;
+                for l in 0..4 {
+                    sums[i + k][j + l] += first.dot(weighed[k][l]);
+                }
+            }
+        }
     }
     std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * sums[i][j] / (OF_SIX[i] * OF_SIX[j])))
 }
 
-/// The hull of nothing.
-const NOTHING: Interval = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
+/// Contains so many numbers, which may be off by so much.
+fn range<const ROWS: usize, const COLUMNS: usize>(rounding: f64, of: impl Fn(usize, usize) -> f64) -> Interval {
+    let mut range = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
+    for i in 0..ROWS {
+        for j in 0..COLUMNS {
+            let value = of(i, j);
+            range = Interval { lower: range.lower.min(value), upper: range.upper.max(value) };
+        }
+    }
+    range.widen(rounding)
+}

@@ -7,8 +7,7 @@
 use std::collections::BinaryHeap;
 
 use super::bends::{Convex, End};
-use super::piece::Piece;
-use super::tree::{NONE, PART, Part, Tree, WIDTH};
+use super::tree::{Half, NONE, PART, Part, Tree, WIDTH};
 use crate::geom::DVec3;
 use crate::simd::{Fuse, multiversion};
 use crate::source::waiting::Waiting;
@@ -77,20 +76,13 @@ fn nearest_body<F: Fuse>(tree: &Tree, p: DVec3, accuracy: f64) -> Foot {
             if least >= best.upper {
                 continue;
             }
-            if let Some(convex) = part.bends.convex(p, DVec3::ZERO) {
-                if part.is_above_tangent(p, best.upper) || newton(tree, part, p, [None; 2], &convex, accuracy * GOAL, &mut best) {
-                    continue;
-                }
-            } else {
-                best.see(part.middle.at, p);
-            }
             if part.node == NONE {
-                if let Some((ends, convex)) = part.bends.at_edge(p, DVec3::ZERO)
-                    && newton(tree, part, p, ends, &convex, accuracy * GOAL, &mut best)
-                {
-                    continue;
+                if !part.solve(tree, p, accuracy, &mut best) {
+                    rest.push((least, item & !PART));
                 }
-                rest.push((least, item & !PART));
+                continue;
+            }
+            if part.solve_inside(tree, p, accuracy, &mut best) {
                 continue;
             }
             node = part.node;
@@ -146,7 +138,8 @@ impl Found {
 /// Newton's method over a part that is convex as seen from `p`, or over the ends at which the nearest point lies; whether the
 /// goal was reached, or nothing nearer is there.
 #[inline(always)]
-fn newton(tree: &Tree, part: &Part, p: DVec3, ends: [Option<End>; 2], convex: &Convex, goal: f64, best: &mut Found) -> bool {
+fn newton(tree: &Tree, part: &Part, p: DVec3, ends: [Option<End>; 2], convex: &Convex, accuracy: f64, best: &mut Found) -> bool {
+    let goal = accuracy * GOAL;
     let net = &tree.nets[part.patch as usize];
     let size = p.abs().max(part.middle.at.abs()).max_element();
     let (mut low, mut high) = (part.low, part.high);
@@ -221,14 +214,36 @@ fn step(slope: [f64; 2], bend: [f64; 2], mixed: f64, held: [bool; 2], room: [[f6
 }
 
 impl Part {
-    /// Whether all of a convex part is certainly no nearer than `least`, squared: it lies above its tangent in the middle.
+    /// Takes the nearest point of the part into account; whether that is certain.
     #[inline(always)]
-    fn is_above_tangent(&self, p: DVec3, least: f64) -> bool {
+    fn solve(&self, tree: &Tree, p: DVec3, accuracy: f64, best: &mut Found) -> bool {
+        self.solve_inside(tree, p, accuracy, best)
+            || self.bends.at_edge(p, DVec3::ZERO).is_some_and(|(ends, convex)| newton(tree, self, p, ends, &convex, accuracy, best))
+    }
+
+    /// The same where the part is convex as seen from `p`; elsewhere looks at its middle.
+    #[inline(always)]
+    fn solve_inside(&self, tree: &Tree, p: DVec3, accuracy: f64, best: &mut Found) -> bool {
+        let Some(convex) = self.bends.convex(p, DVec3::ZERO) else {
+            best.see(self.middle.at, p);
+            return false;
+        };
+        self.tangent(p) >= best.upper || newton(tree, self, p, [None; 2], &convex, accuracy, best)
+    }
+
+    /// The least squared distance along the tangent in the middle.
+    #[inline(always)]
+    fn tangent(&self, p: DVec3) -> f64 {
         let middle = &self.middle;
         let way = middle.at - p;
         let fall = way.dot(middle.u).abs() * (self.high[0] - self.low[0]) + way.dot(middle.v).abs() * (self.high[1] - self.low[1]);
         let noise = 64.0 * f64::EPSILON * (p.abs().max_element() + middle.at.abs().max_element()) * (way.length() + self.reach);
-        way.length_squared() - fall - noise >= least
+        way.length_squared() - fall - noise
+    }
+
+    /// No more than the squared distance to any of its points: the tangent, less how it bends at most away from it.
+    fn least(&self, p: DVec3) -> f64 {
+        self.tangent(p) - self.bends.droop(p, [self.high[0] - self.low[0], self.high[1] - self.low[1]])
     }
 
     /// Where Newton's method starts: after one step from the middle.
@@ -250,39 +265,29 @@ impl Part {
 /// Goes on with parts that no bound decided, halving them, the nearest first.
 #[inline(never)]
 fn take_apart(tree: &Tree, p: DVec3, accuracy: f64, rest: &[(f64, u32)], best: &mut Found) {
-    let reached = |bound: f64, upper: f64| bound.sqrt() >= upper.sqrt() - accuracy;
-    let mut heap: BinaryHeap<_> =
-        rest.iter().enumerate().map(|(number, &(bound, part))| Waiting { bound, number, item: Waits::Part(part) }).collect();
-    let mut pieces: Vec<Piece> = Vec::new();
-    let mut lower = f64::INFINITY;
+    let mut heap = BinaryHeap::new();
+    let mut halves: Vec<Half> = Vec::new();
+    for (number, &(bound, part)) in rest.iter().enumerate() {
+        heap.push(Waiting { bound, number, item: number });
+        halves.push(tree.half(&tree.parts[part as usize]));
+    }
+    let reached = |bound: f64, best: &Found| bound.max(0.0).sqrt() >= best.upper.sqrt() - accuracy;
     while let Some(Waiting { bound, item, .. }) = heap.pop() {
-        if reached(bound, best.upper) || pieces.len() > MOST {
-            lower = lower.min(bound);
+        if reached(bound, best) || halves.len() > MOST {
+            best.lower = best.lower.min(bound);
             break;
         }
-        let piece = match item {
-            Waits::Part(part) => &tree.piece(&tree.parts[part as usize]),
-            Waits::Piece(piece) => &pieces[piece],
-        };
-        let found = piece.nearest(p);
-        best.see(found.point, p);
-        if reached(found.lower.max(0.0), best.upper) {
-            lower = lower.min(found.lower);
-            continue;
-        }
-        for half in piece.halves() {
-            let bound = (half.extent().distance_squared(p) * (1.0 - 8.0 * f64::EPSILON)).max(found.lower).max(bound);
-            heap.push(Waiting { bound, number: rest.len() + pieces.len(), item: Waits::Piece(pieces.len()) });
-            pieces.push(half);
+        for half in halves[item].halves() {
+            let part = tree.part(&half);
+            let boxes = half.piece.extent().distance_squared(p) * (1.0 - 8.0 * f64::EPSILON);
+            let bound = bound.max(boxes).max(part.oriented.distance_squared(p)).max(part.least(p));
+            if reached(bound, best) {
+                best.lower = best.lower.min(bound);
+            } else if !part.solve(tree, p, accuracy, best) {
+                heap.push(Waiting { bound, number: halves.len(), item: halves.len() });
+                halves.push(half);
+            }
         }
     }
-    best.lower = best.lower.min(lower);
     best.square = best.square.clamp(best.lower, best.upper);
-}
-
-/// What is still to be taken apart.
-#[derive(Clone, Copy, Debug)]
-enum Waits {
-    Part(u32),
-    Piece(usize),
 }

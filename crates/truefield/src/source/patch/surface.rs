@@ -1,10 +1,10 @@
 //! A set of patches ready to be asked.
 
+use super::bends::Bends;
 use super::bezier::Bezier;
 use super::nearest::{Foot, nearest};
-use super::piece::Piece;
 use super::side::Sided;
-use super::tree::{NONE, PART, Tree};
+use super::tree::{Half, NONE, PART, Tree};
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
@@ -12,7 +12,7 @@ use crate::run::Run;
 use crate::source::balls;
 
 /// Halvings of a part that are tried for a whole cell.
-const FINER: u32 = 5;
+const FINER: u32 = 4;
 
 /// Where the way to the nearest point is no more than this many times the accuracy, its direction is not relied on.
 const TOUCHING: f64 = 1e4;
@@ -79,7 +79,7 @@ impl Patches {
         let (center, spread) = (cell.center(), 0.5 * cell.size() * (1.0 + 1e-12));
         let beyond = (reach + cell.radius()).powi(2) * (1.0 + 1e-12);
         let mut pending = vec![self.tree.root];
-        let mut halves: Vec<(Piece, u32)> = Vec::new();
+        let mut halves: Vec<(Half, u32)> = Vec::new();
         while let Some(node) = pending.pop() {
             for (_, child) in self.tree.nodes[node as usize].each().filter(|(extent, _)| near(extent)) {
                 if child & PART == 0 {
@@ -93,17 +93,19 @@ impl Patches {
                 if part.node != NONE {
                     pending.push(part.node);
                 } else if part.bends.at_edge(center, spread).is_none() {
-                    halves.push((self.tree.piece(part), FINER));
+                    halves.push((self.tree.half(part), FINER));
                 }
             }
-            while let Some((piece, levels)) = halves.pop() {
-                if !near(piece.extent()) || piece.is_simple(cell) {
-                    continue;
-                }
+            while let Some((whole, levels)) = halves.pop() {
                 if levels == 0 {
                     return false;
                 }
-                halves.extend(piece.halves().map(|half| (half, levels - 1)));
+                for half in whole.halves() {
+                    let simple = |bends: &Bends| bends.convex(center, spread).is_some() || bends.at_edge(center, spread).is_some();
+                    if near(half.piece.extent()) && !simple(&half.bends()) {
+                        halves.push((half, levels - 1));
+                    }
+                }
             }
         }
         true

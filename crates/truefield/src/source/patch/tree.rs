@@ -73,9 +73,8 @@ impl Tree {
             Self { nets, patches: patches.to_vec(), nodes: Vec::new(), parts: Vec::new(), root: 0, extent: Aabb::EMPTY, size: 0.0 };
         let roots: Vec<(Aabb, u32)> = (0..patches.len())
             .map(|patch| {
-                let whole = Rectangle { low: [0.0; 2], size: [1.0; 2] };
                 let piece = Piece::new(patches[patch]);
-                tree.grow(patch as u32, &piece, whole, 0)
+                tree.grow(&Half { patch: patch as u32, piece, low: [0.0; 2], size: [1.0; 2] }, 0)
             })
             .collect();
         tree.extent = around(&roots);
@@ -84,10 +83,26 @@ impl Tree {
         tree
     }
 
-    /// The patch over the rectangle of a part.
-    pub fn piece(&self, part: &Part) -> Piece {
+    /// A part of a patch, without parts of its own.
+    pub fn part(&self, half: &Half) -> Part {
+        let Half { patch, piece, low, size } = half;
+        Part {
+            patch: *patch,
+            node: NONE,
+            low: *low,
+            high: [low[0] + size[0], low[1] + size[1]],
+            bends: half.bends(),
+            oriented: piece.oriented(),
+            middle: self.nets[*patch as usize].derivatives([low[0] + 0.5 * size[0], low[1] + 0.5 * size[1]]),
+            reach: piece.extent().diagonal(),
+        }
+    }
+
+    /// What a part is made of.
+    pub fn half(&self, part: &Part) -> Half {
         let size = [part.high[0] - part.low[0], part.high[1] - part.low[1]];
-        Piece::new(self.patches[part.patch as usize].part(part.low, size))
+        let piece = Piece::new(self.patches[part.patch as usize].part(part.low, size));
+        Half { patch: part.patch, piece, low: part.low, size }
     }
 
     /// Of length 1, and none where the patch is a point or an edge.
@@ -97,35 +112,17 @@ impl Tree {
     }
 
     /// Adds a part of a patch and its own parts; a box around it, and what it is called among children.
-    fn grow(&mut self, patch: u32, piece: &Piece, rectangle: Rectangle, level: u32) -> (Aabb, u32) {
-        let Rectangle { low, size } = rectangle;
-        let middle = self.nets[patch as usize].derivatives([low[0] + 0.5 * size[0], low[1] + 0.5 * size[1]]);
-        let bends = Bends::new(piece, size);
-        let known = bends.determinant() / middle.u.cross(middle.v).length_squared();
-        let part = Part {
-            patch,
-            node: NONE,
-            low,
-            high: [low[0] + size[0], low[1] + size[1]],
-            bends,
-            oriented: piece.oriented(),
-            reach: piece.extent().diagonal(),
-            middle,
-        };
-        let (number, mut extent) = (self.parts.len(), *piece.extent());
+    fn grow(&mut self, half: &Half, level: u32) -> (Aabb, u32) {
+        let part = self.part(half);
+        let known = part.bends.determinant() / part.middle.u.cross(part.middle.v).length_squared();
+        let (number, mut extent) = (self.parts.len(), *half.piece.extent());
         self.parts.push(part);
         if level < LEVELS && !(known > FLAT) && (level < USUAL || known <= KNOWN) {
-            let mut parts = vec![(piece.clone(), rectangle)];
+            let mut parts = vec![half.clone()];
             while parts.len() < WIDTH {
-                parts = parts
-                    .into_iter()
-                    .flat_map(|(piece, rectangle)| {
-                        let axis = piece.longer();
-                        piece.halves().into_iter().zip(rectangle.halves(axis))
-                    })
-                    .collect();
+                parts = parts.iter().flat_map(Half::halves).collect();
             }
-            let children: Vec<_> = parts.into_iter().map(|(piece, rectangle)| self.grow(patch, &piece, rectangle, level + 1)).collect();
+            let children: Vec<_> = parts.iter().map(|part| self.grow(part, level + 1)).collect();
             extent = around(&children);
             self.parts[number].node = self.node(children);
         }
@@ -164,19 +161,29 @@ impl Tree {
     }
 }
 
-/// Of u and v.
-#[derive(Clone, Copy, Debug)]
-struct Rectangle {
+/// A patch over a rectangle of (u, v).
+#[derive(Clone, Debug)]
+pub(super) struct Half {
+    patch: u32,
+    pub piece: Piece,
     low: [f64; 2],
     size: [f64; 2],
 }
 
-impl Rectangle {
-    fn halves(mut self, axis: usize) -> [Self; 2] {
-        self.size[axis] *= 0.5;
-        let mut upper = self;
-        upper.low[axis] += self.size[axis];
-        [self, upper]
+impl Half {
+    pub fn bends(&self) -> Bends {
+        Bends::new(&self.piece, self.size)
+    }
+
+    /// Cut across the direction in which it is longer.
+    pub fn halves(&self) -> [Self; 2] {
+        let axis = self.piece.longer();
+        let (mut low, mut size) = (self.low, self.size);
+        size[axis] *= 0.5;
+        let [below, above] = self.piece.halves();
+        let first = Self { patch: self.patch, piece: below, low, size };
+        low[axis] += size[axis];
+        [first, Self { patch: self.patch, piece: above, low, size }]
     }
 }
 
