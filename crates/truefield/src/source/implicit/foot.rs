@@ -7,9 +7,6 @@ use super::sheet::{Sheet, Side};
 use super::tape::Tape;
 use crate::geom::{Aabb, DVec3, Interval};
 
-/// Newton's method doubles its digits: where a step was this small, in sizes of the box, it is done.
-const DONE: f64 = 1e-9;
-
 /// Where the surface seems nearest to a point within a box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Foot {
@@ -22,8 +19,8 @@ pub(super) struct Foot {
 impl Foot {
     /// Newton's method on the nearest point to `p` within `limits` where the value of `jet` is 0, from `start`.
     ///
-    /// Nothing is promised of the result.
-    pub(super) fn find(jet: impl Fn(DVec3) -> Jet<f64, 6>, p: DVec3, start: DVec3, limits: &Aabb, steps: usize) -> Option<Self> {
+    /// It ends where a step was as small as `done`, in sizes of the box. Nothing is promised of the result.
+    pub(super) fn find(jet: impl Fn(DVec3) -> Jet<f64, 6>, p: DVec3, start: DVec3, limits: &Aabb, steps: usize, done: f64) -> Option<Self> {
         let mut x = start.clamp(limits.min, limits.max);
         let mut multiplier = f64::NAN;
         let mut gradient = DVec3::ZERO;
@@ -52,7 +49,7 @@ impl Foot {
             }
             let moved = (target - x).length();
             x = target;
-            if moved <= DONE * reach {
+            if moved <= done * reach {
                 break;
             }
         }

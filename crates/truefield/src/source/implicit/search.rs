@@ -28,6 +28,12 @@ const SHRINKS: usize = 8;
 /// Newton steps; from a point of the right sheet, two or three do.
 const STEPS: usize = 16;
 
+/// They double their digits: where one was this small, in sizes of the box, it is the last.
+const DONE: f64 = 1e-9;
+
+/// Boxes are farther than the surface for certain, where they are by this part.
+const CLEAR: f64 = 1.0 + 1e-9;
+
 /// How exactly the surface is located.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Accuracy {
@@ -87,6 +93,8 @@ pub(super) struct Search<'a> {
     /// Squared: what was set aside is no nearer.
     floor: f64,
     upper: f64,
+    /// Squared: some surface is nearer, whichever; what is not, is not looked at.
+    beyond: f64,
     foot: Option<DVec3>,
     /// Boxes whose surface is no nearer than `floor` says.
     proven: Vec<Aabb>,
@@ -101,7 +109,24 @@ impl<'a> Search<'a> {
     pub(super) fn new(tape: &'a Tape, domain: &'a Aabb, boxes: &'a Boxes, accuracy: Accuracy, p: DVec3, side: Side, limit: f64) -> Self {
         let (heap, pieces, proven, feet) = (BinaryHeap::new(), Vec::new(), Vec::new(), Vec::new());
         let (floor, upper) = (f64::INFINITY, limit);
-        Self { tape, domain, boxes, accuracy, p, side, heap, pieces, open: 0, floor, upper, foot: None, proven, feet, first: None }
+        Self {
+            tape,
+            domain,
+            boxes,
+            accuracy,
+            p,
+            side,
+            heap,
+            pieces,
+            open: 0,
+            floor,
+            upper,
+            beyond: f64::INFINITY,
+            foot: None,
+            proven,
+            feet,
+            first: None,
+        }
     }
 
     /// Searches the tree from these nodes on.
@@ -157,7 +182,7 @@ impl<'a> Search<'a> {
             Place::Sheet(index, _) => 2 << 32 | index as usize,
             Place::Piece(index) => 3 << 32 | index as usize,
         };
-        if bound < self.upper * self.upper {
+        if bound < self.upper * self.upper && bound <= self.beyond {
             self.heap.push(Waiting { bound, number, item: place });
         }
     }
@@ -169,10 +194,15 @@ impl<'a> Search<'a> {
         let children = if node.count == 0 { index..index + 1 } else { node.first..node.first + u32::from(node.count) };
         for child in children {
             let Node { extent, count, sheet, .. } = &boxes.nodes[child as usize];
-            let bound = match sheet {
-                Some(sheet) => boxes.taylors[*sheet as usize].rough(self.p, extent),
-                None => extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON),
-            };
+            let mut bound = extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON);
+            if bound > self.beyond {
+                continue;
+            }
+            if let Some(sheet) = sheet {
+                let taylor = &boxes.taylors[*sheet as usize];
+                self.beyond = self.beyond.min((taylor.most(self.p) * CLEAR).powi(2));
+                bound = taylor.rough(self.p, extent);
+            }
             if self.tells(child, bound) {
                 self.enter(bound, if *count == 0 { Place::Leaf(child) } else { Place::Node(child) });
             }
@@ -205,7 +235,12 @@ impl<'a> Search<'a> {
         let node = &self.boxes.nodes[index as usize];
         match node.sheet {
             Some(sheet) => {
-                let (least, near) = self.boxes.taylors[sheet as usize].least(self.p, &node.extent);
+                if bound > self.beyond {
+                    return;
+                }
+                let taylor = &self.boxes.taylors[sheet as usize];
+                let (least, near) = taylor.least_within(self.p, &node.extent, self.beyond);
+                self.beyond = self.beyond.min((taylor.most_by(self.p, near, &node.extent) * CLEAR).powi(2));
                 let bound = bound.max(least);
                 if self.is_enough(bound) {
                     self.floor = self.floor.min(bound);
@@ -335,7 +370,7 @@ impl<'a> Search<'a> {
         if self.feet.iter().any(|foot| extent.contains(*foot)) {
             return false;
         }
-        let Some(foot) = Foot::find(|x| self.tape.jet(x), self.p, near, extent, STEPS) else { return false };
+        let Some(foot) = Foot::find(|x| self.tape.jet(x), self.p, near, extent, STEPS, DONE) else { return false };
         let here = self.tape.jet_over::<0>(&Aabb::new(foot.point, foot.point));
         let far = (foot.point - self.p).length();
         if far < self.upper {

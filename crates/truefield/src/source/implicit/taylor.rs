@@ -10,6 +10,9 @@ use crate::geom::{Aabb, DVec3, Interval};
 /// Newton steps on the expansion, from its tangent plane.
 const STEPS: usize = 3;
 
+/// A step that small, in sizes of the box, is the last: the bound loses no more than the square of the next.
+const DONE: f64 = 1e-3;
+
 /// A part of the least tangential eigenvalue that may be given up for the normal direction.
 const SHARE: f64 = 0.25;
 
@@ -26,6 +29,9 @@ pub(super) struct Taylor {
     matrix: [f64; 6],
     remainder: f64,
     thickness: f64,
+    /// The middle of the tangent plane, and how far some surface of the box is from it at most: infinite where there may be none.
+    onto: DVec3,
+    reach: f64,
     /// Contains the eigenvalues of the matrix.
     whole: Interval,
     /// Contains those of its part along the tangent plane, and 0.
@@ -65,7 +71,12 @@ impl Taylor {
         let scale = 1e-13 * matrix.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
         let tangential = eigenvalues(&flat).widen(scale).hull(Interval::exact(0.0));
         let whole = eigenvalues(&matrix.map(Interval::exact));
-        Self { center, half, value, normal, matrix, remainder, thickness, whole, tangential, along, across: rest.length() + scale }
+        let across = rest.length() + scale;
+        // Off the slab on either side, the formula has either sign; surface is between, where both places are in the box.
+        let slab = thickness * (1.0 + 1e-14);
+        let reach = if ((normal * value).abs() + normal.abs() * slab).cmplt(half * (1.0 - 1e-12)).all() { slab } else { f64::INFINITY };
+        let onto = center - normal * value;
+        Self { center, half, value, normal, matrix, remainder, thickness, onto, reach, whole, tangential, along, across }
     }
 
     /// That of a sheet in a box in which the formula rises.
@@ -78,6 +89,12 @@ impl Taylor {
     pub(super) fn is_empty(&self, part: &Aabb) -> bool {
         let height = self.value + self.normal.dot(part.center() - self.center);
         height.abs() > (self.normal.abs().dot(half(part)) + self.thickness) * (1.0 + 1e-14)
+    }
+
+    /// No less than the distance of `p` to the surface in the box, infinite where there may be none.
+    pub(super) fn most(&self, p: DVec3) -> f64 {
+        let size = p.abs().max_element() + self.onto.abs().max_element();
+        p.distance(self.onto) + self.reach + 8.0 * f64::EPSILON * size
     }
 
     /// The sign of the formula in the middle.
@@ -112,6 +129,11 @@ impl Taylor {
     /// the expansion, s its linear part, and any a and b >= 0. From any point of the box, w is no less than its tangent
     /// there plus its least eigenvalue times the square of the way.
     pub(super) fn least(&self, p: DVec3, cell: &Aabb) -> (f64, DVec3) {
+        self.least_within(p, cell, f64::INFINITY)
+    }
+
+    /// [`Taylor::least`], or any bound above `enough` where that is soon found.
+    pub(super) fn least_within(&self, p: DVec3, cell: &Aabb, enough: f64) -> (f64, DVec3) {
         let local = Aabb::new(cell.min - self.center, cell.max - self.center);
         let q = p - self.center;
         let start = q - self.normal * (self.normal.dot(q) + self.value);
@@ -123,12 +145,35 @@ impl Taylor {
                 hessian: self.matrix,
             }
         };
-        let Some(foot) = Foot::find(expansion, q, start, &local, STEPS) else {
+        let bound = |foot: &Foot| {
+            if foot.multiplier.is_finite() { self.tangent(q, foot.point, foot.multiplier, &local) } else { f64::NEG_INFINITY }
+        };
+        if enough < f64::INFINITY
+            && let Some(foot) = Foot::find(expansion, q, start, &local, 1, DONE)
+        {
+            let bound = bound(&foot);
+            if bound > enough {
+                return (bound, self.center + foot.point);
+            }
+        }
+        let Some(foot) = Foot::find(expansion, q, start, &local, STEPS, DONE) else {
             return (f64::NEG_INFINITY, self.center + start.clamp(local.min, local.max));
         };
-        let (v, a) = (foot.point, foot.multiplier);
-        let bound = if a.is_finite() { self.tangent(q, v, a, &local) } else { f64::NEG_INFINITY };
-        (bound, self.center + v)
+        (bound(&foot), self.center + foot.point)
+    }
+
+    /// No less than the distance of `p` to the surface by a point of the box, infinite where there may be none.
+    ///
+    /// Along the normal the formula, in lengths, changes by half of the way at least: gradients are steady.
+    pub(super) fn most_by(&self, p: DVec3, near: DVec3, cell: &Aabb) -> f64 {
+        let v = near - self.center;
+        let level = self.value + self.normal.dot(v) + 0.5 * v.dot(times(&self.matrix, v));
+        let aside = 2.0 * (level.abs() + self.remainder) * (1.0 + 1e-9);
+        if !(cell.contains(near - self.normal * aside) && cell.contains(near + self.normal * aside)) {
+            return f64::INFINITY;
+        }
+        let size = p.abs().max_element() + near.abs().max_element();
+        p.distance(near) + aside + 8.0 * f64::EPSILON * size
     }
 
     /// The least of the tangent of w at `v`, and its least eigenvalue, over a box; all are counted from the middle.
