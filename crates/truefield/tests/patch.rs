@@ -212,3 +212,146 @@ fn answers_do_not_depend_on_threads() {
     })
     .unwrap_or_else(|broken| panic!("{broken}"));
 }
+
+/// Points of a patch on a lattice, and for a point the least distance to them after walking downhill from the nearest.
+struct Judge {
+    set: Vec<Bezier>,
+    samples: Vec<(usize, f64, f64, DVec3)>,
+}
+
+impl Judge {
+    fn new(set: &[Bezier]) -> Self {
+        let steps = 48;
+        let lattice = move |k: usize| (0..=steps).flat_map(move |i| (0..=steps).map(move |j| (k, f64::from(i), f64::from(j))));
+        let all = (0..set.len()).flat_map(lattice).map(|(k, i, j)| (k, i / f64::from(steps), j / f64::from(steps)));
+        Self { set: set.to_vec(), samples: all.map(|(k, u, v)| (k, u, v, set[k].point(u, v))).collect() }
+    }
+
+    fn distance(&self, p: DVec3) -> f64 {
+        let mut order: Vec<usize> = (0..self.samples.len()).collect();
+        let far = |n: &usize| (self.samples[*n].3 - p).length_squared();
+        order.select_nth_unstable_by(3, |a, b| far(a).total_cmp(&far(b)));
+        order[..4].iter().map(|&n| self.downhill(self.samples[n], p)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// By ever smaller steps along u and v, of which nothing can go wrong.
+    fn downhill(&self, (k, mut u, mut v, at): (usize, f64, f64, DVec3), p: DVec3) -> f64 {
+        let (mut best, mut step) = ((at - p).length(), 0.03);
+        while step > 1e-11 {
+            let mut moved = false;
+            for (du, dv) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0)] {
+                let (s, t) = ((u + step * du).clamp(0.0, 1.0), (v + step * dv).clamp(0.0, 1.0));
+                let far = (self.set[k].point(s, t) - p).length();
+                if far < best {
+                    (best, u, v, moved) = (far, s, t, true);
+                }
+            }
+            if !moved {
+                step *= 0.5;
+            }
+        }
+        best
+    }
+}
+
+/// Patches on which something degenerates, each around the unit box.
+fn nasty(random: &mut Random) -> Vec<(&'static str, Vec<Bezier>)> {
+    let mut collapsed = wavy(random);
+    collapsed.0[3] = [collapsed.0[3][0]; 4];
+    let mut wedge = wavy(random);
+    let tip = wedge.0[0][0];
+    wedge.0[0] = [tip; 4];
+    wedge.0.iter_mut().for_each(|row| row[3] = tip);
+    let mut folded = wavy(random);
+    folded.0.swap(1, 2);
+    folded.0[0].swap(0, 3);
+    let mut sharp = wavy(random);
+    sharp.0[1] = sharp.0[0];
+    let plane = flat(DVec3::new(0.0, 0.1, 0.2), DVec3::new(1.0, 0.2, 0.0), DVec3::new(0.1, 1.0, 0.3));
+    let line = flat(DVec3::splat(0.2), DVec3::new(0.6, 0.3, 0.1), DVec3::new(0.6, 0.3, 0.1));
+    let twice = wavy(random);
+    vec![
+        ("an edge that is a point", vec![collapsed]),
+        ("two edges that are a point", vec![wedge]),
+        ("folded over itself", vec![folded]),
+        ("an edge without slope", vec![sharp]),
+        ("flat", vec![plane]),
+        ("a line", vec![line]),
+        ("a point", vec![Bezier([[DVec3::new(0.3, 0.4, 0.5); 4]; 4])]),
+        ("twice the same", vec![twice, twice]),
+        ("a ball, with poles", ball()),
+        ("many", (0..20).map(|_| wavy(random)).collect()),
+    ]
+}
+
+#[test]
+fn nothing_degenerate_is_nearer_than_said() {
+    let mut random = Random::new(11);
+    for (name, set) in nasty(&mut random) {
+        for (scale, offset) in [(1.0, DVec3::ZERO), (1e-6, DVec3::ZERO), (1e6, DVec3::ZERO), (1.0, DVec3::new(3e4, -2e4, 1e4))] {
+            let place = |p: DVec3| p * scale + offset;
+            let set: Vec<Bezier> = set.iter().map(|patch| Bezier(patch.0.map(|row| row.map(place)))).collect();
+            let (shape, judge) = (patches(&set, Sides::Unsigned), Judge::new(&set));
+            let size = scale + offset.length();
+            let (mut wide, count) = (0, 40);
+            for n in 0..count {
+                let on = set[random.below(set.len())].point(random.unit(), random.unit());
+                let p = match n % 5 {
+                    0 => place(random.within(&Aabb::new(DVec3::splat(-1.5), DVec3::splat(2.5)))),
+                    1 => on + random.direction() * (scale * random.length(1e-9, 0.1)),
+                    2 => on,
+                    3 => on + random.direction() * (scale * random.length(3.0, 1e3)),
+                    // On an axis of symmetry.
+                    _ => place(DVec3::new(0.0, 0.0, random.between(-2.0, 2.0))),
+                };
+                let (at, truth) = (shape.at(p), judge.distance(p));
+                let rounding = 1e-14 * (size + p.abs().max_element());
+                assert!(at.lower <= truth + rounding, "{name} times {scale}: {at:?} at {p}, but a point is {truth} away");
+                assert!(at.lower <= value(&shape, p) && value(&shape, p) <= at.upper, "{name}: {at:?} at {p}");
+                let foot = (shape.foot(p) - p).length();
+                assert!(foot <= at.upper + rounding && foot >= at.lower - rounding, "{name}: {foot}, not {at:?} at {p}");
+                // Only where much of the surface is as near does the search not end.
+                wide += usize::from(at.width() > 1e-10 * (4.0 * size + p.abs().max_element()));
+            }
+            assert!(wide <= count / 5, "{name} times {scale}: {wide} of {count} are wide");
+        }
+    }
+}
+
+#[test]
+fn sides_hold_next_to_the_surface_and_slopes_lead_away_from_it() {
+    let mut random = Random::new(12);
+    let mut certain = 0;
+    for set in [ball(), cube(0.7)] {
+        let shape = patches(&set, Sides::Closed);
+        for _ in 0..600 {
+            let patch = set[random.below(set.len())];
+            let (u, v) = (random.between(0.02, 0.98), random.between(0.02, 0.98));
+            let at = |u: f64, v: f64| patch.point(u, v);
+            let normal = (at(u + 1e-6, v) - at(u - 1e-6, v)).cross(at(u, v + 1e-6) - at(u, v - 1e-6)).normalize();
+            let height = random.length(1e-8, 0.01) * [1.0, -1.0][random.below(2)];
+            let p = at(u, v) + normal * height;
+            let bounds = shape.at(p);
+            assert!(bounds.widen(1e-11).contains(height), "{bounds:?} at {p}, {height} above");
+            if bounds.lower * bounds.upper > 0.0 {
+                certain += 1;
+                let mut slope = [DVec3::ZERO];
+                shape.gradients(&[p], &mut slope).expect("a slope");
+                assert!((slope[0] - normal).length() < 1e-3, "{} at {p}, not {normal}", slope[0]);
+            }
+        }
+    }
+    assert!(certain > 1100, "{certain}");
+}
+
+#[test]
+fn a_point_s_value_does_not_depend_on_its_neighbours() {
+    let shape = patches(&ball(), Sides::Closed);
+    let mut random = Random::new(13);
+    let places: Vec<DVec3> = (0..200).map(|_| random.direction() * random.length(0.1, 3.0)).collect();
+    let mut together = vec![0.0; places.len()];
+    shape.values(&places, &mut together).expect("values");
+    for (&p, together) in places.iter().zip(together) {
+        assert_eq!(value(&shape, p).to_bits(), together.to_bits(), "{p}");
+    }
+}

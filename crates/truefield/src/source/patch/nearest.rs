@@ -15,6 +15,9 @@ use crate::source::waiting::Waiting;
 /// Newton steps of a part that is convex; mostly two or three are enough.
 const STEPS: usize = 12;
 
+/// Points that are looked at in a part that is not.
+const WALK: usize = 5;
+
 /// Of what is asked for: beyond it, a step costs little and the answers are good to rounding.
 const GOAL: f64 = 1.0 / 64.0;
 
@@ -231,6 +234,23 @@ impl Part {
         self.tangent(p) >= best.upper || newton(tree, self, p, [None; 2], &convex, accuracy, best)
     }
 
+    /// Looks at some points on the way to the nearest one, where no bound on bends leads there.
+    fn walk(&self, tree: &Tree, p: DVec3, best: &mut Found) {
+        let mut t = [0.5 * (self.low[0] + self.high[0]), 0.5 * (self.low[1] + self.high[1])];
+        for _ in 0..WALK {
+            let here = tree.nets[self.patch as usize].derivatives(t);
+            best.see(here.at, p);
+            let way = here.at - p;
+            // By first derivatives only, and never singular.
+            let squares = [here.u.length_squared(), here.v.length_squared()];
+            let more = 1e-9 * (squares[0] + squares[1]) + f64::MIN_POSITIVE;
+            let room = std::array::from_fn(|k| [self.low[k] - t[k], self.high[k] - t[k]]);
+            let slope = [way.dot(here.u), way.dot(here.v)];
+            let step = step(slope, squares.map(|square| square + more), here.u.dot(here.v), [false; 2], room);
+            t = std::array::from_fn(|k| (t[k] + step[k]).clamp(self.low[k], self.high[k]));
+        }
+    }
+
     /// The least squared distance along the tangent in the middle.
     #[inline(always)]
     fn tangent(&self, p: DVec3) -> f64 {
@@ -284,10 +304,12 @@ fn take_apart(tree: &Tree, p: DVec3, accuracy: f64, rest: &[(f64, u32)], best: &
             if reached(bound, best) {
                 best.lower = best.lower.min(bound);
             } else if !part.solve(tree, p, accuracy, best) {
+                part.walk(tree, p, best);
                 heap.push(Waiting { bound, number: halves.len(), item: halves.len() });
                 halves.push(half);
             }
         }
     }
+    best.lower = best.lower.min(best.upper);
     best.square = best.square.clamp(best.lower, best.upper);
 }
