@@ -129,7 +129,7 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
 
 /// Offers a triangle to the points for which its filtered squared distance is not above a limit.
 #[inline(always)]
-pub(super) fn exact_near<F: Fuse>(
+fn exact_near<F: Fuse>(
     tree: &Tree,
     points: &Points,
     slot: Slot,

@@ -6,6 +6,7 @@ mod cloud;
 pub(crate) mod cover;
 pub(crate) mod descend;
 pub(crate) mod evaluate;
+pub(crate) mod feet;
 mod frame;
 pub(crate) mod intersect;
 mod nearest;

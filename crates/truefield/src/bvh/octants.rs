@@ -6,9 +6,8 @@
 //! rules out for an octant. Witnesses are the exact nearest points of the octant's corners.
 
 use super::cover::{OCTANTS, filter_error};
-use super::evaluate::{Answers, Points, exact_near};
+use super::feet::{Feet, Found};
 use super::frame::Offsets;
-use super::nearest::Candidate;
 use super::tree::{Slot, Tree};
 use crate::geom::{Aabb, DVec3};
 use crate::simd::{Fuse, multiversion};
@@ -60,11 +59,12 @@ pub(crate) const fn node(octant: usize, corner: usize) -> usize {
 pub(crate) struct Octants {
     base: DVec3,
     error: f32,
-    points: Points,
+    points: [DVec3; LANES * PARTS],
     offsets: [Offsets<LANES>; PARTS],
     /// Squared distances to each triangle of the list.
     rows: Vec<[[f32; LANES]; PARTS]>,
-    answers: Answers,
+    feet: Feet,
+    spare: Vec<Slot>,
 }
 
 impl Default for Octants {
@@ -72,10 +72,11 @@ impl Default for Octants {
         Self {
             base: DVec3::ZERO,
             error: 0.0,
-            points: Points::of_some(&[DVec3::ZERO]),
+            points: [DVec3::ZERO; LANES * PARTS],
             offsets: std::array::from_fn(|_| Offsets::from_fn(|_| DVec3::ZERO)),
             rows: Vec::new(),
-            answers: Answers::NONE,
+            feet: Feet::default(),
+            spare: Vec::new(),
         }
     }
 }
@@ -83,43 +84,48 @@ impl Default for Octants {
 impl Octants {
     /// Takes up a cell, the corners of its octants and a complete list.
     pub fn measure(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES], list: &[Slot]) {
-        let lanes: [DVec3; NODES] = NODE.map(|node| nodes[usize::from(node)]);
-        self.points = Points::of_some(&lanes);
-        self.base = cell.center();
-        self.error = filter_error(tree, cell) as f32;
-        self.offsets = std::array::from_fn(|part| Offsets::from_fn(|lane| lanes[(part * LANES + lane).min(NODES - 1)] - self.base));
+        self.place(tree, cell, nodes);
         measure(tree, self, list);
     }
 
-    /// Drops from the list what the nearest points of the cell's corners rule out.
-    pub fn shorten(&mut self, feet: &[DVec3; CORNERS], list: &mut Vec<Slot>) {
+    /// [`Self::measure`], dropping from the list what the nearest points of the cell's corners rule out.
+    pub fn shorten(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES], feet: &[DVec3; CORNERS], list: &mut Vec<Slot>) {
+        self.place(tree, cell, nodes);
         let reach = reaches(self, &[std::array::from_fn(|corner| corner as u8); 2], &[*feet; 2]);
-        shorten(self, &reach, list);
+        shorten(tree, self, &reach, list);
     }
 
-    /// The nearest triangles of the nodes that are no corners of the cell, with the bits of brute force.
-    pub fn nearest(&mut self, tree: &Tree, list: &[Slot]) -> [Candidate; NODES] {
+    fn place(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES]) {
+        self.points = std::array::from_fn(|lane| nodes[usize::from(NODE[lane.min(NODES - 1)])]);
+        self.base = cell.center();
+        self.error = filter_error(tree, cell) as f32;
+        self.offsets = std::array::from_fn(|part| Offsets::from_fn(|lane| self.points[part * LANES + lane] - self.base));
+    }
+
+    /// The nearest triangles and points of the nodes that are no corners of the cell, with the bits of brute force.
+    pub fn nearest(&mut self, tree: &Tree, list: &[Slot]) -> [Found; NODES] {
         nearest(tree, self, list);
-        std::array::from_fn(|node| {
-            let lane = usize::from(LANE[node]);
-            Candidate { distance_squared: self.answers.squared[lane], triangle: self.answers.triangle[lane] }
-        })
+        std::array::from_fn(|node| self.feet.found(usize::from(LANE[node])))
     }
 
     /// Fills `out` with the complete lists of those octants that are `wanted`, a bit for each, from the nearest points of all
     /// nodes, which have to be answered; keeps the list's order.
-    pub fn split(&self, wanted: u8, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
+    pub fn split(&mut self, wanted: u8, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
         let mut octants = (0..OCTANTS).filter(|octant| wanted >> octant & 1 == 1);
         while let Some(first) = octants.next() {
             let second = octants.next();
+            if list.len() > 1 {
+                let mut lists =
+                    [std::mem::take(&mut out[first]), std::mem::take(second.map_or(&mut self.spare, |second| &mut out[second]))];
+                split(self, [first, second.unwrap_or(first)], feet, list, &mut lists);
+                let [low, high] = lists;
+                out[first] = low;
+                *second.map_or(&mut self.spare, |second| &mut out[second]) = high;
+                continue;
+            }
             for octant in [Some(first), second].into_iter().flatten() {
                 out[octant].clear();
-                if let &[only] = list {
-                    out[octant].push(only);
-                }
-            }
-            if list.len() > 1 {
-                split(self, &[first, second.unwrap_or(first)], feet, list, out);
+                out[octant].extend(list);
             }
         }
     }
@@ -129,20 +135,22 @@ impl Octants {
 type Reach = [[f32; LANES]; CORNERS];
 
 multiversion!(fn measure(tree: &Tree, octants: &mut Octants, list: &[Slot]) = measure_body);
-multiversion!(fn shorten(octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) = shorten_body);
+multiversion!(fn shorten(tree: &Tree, octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) = shorten_body);
 multiversion!(fn nearest(tree: &Tree, octants: &mut Octants, list: &[Slot]) = nearest_body);
 multiversion!(
-    /// The lists of two octants; one where they are the same.
-    fn split(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) = split_body
+    /// The lists of two octants.
+    fn split(octants: &Octants, pair: [usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; 2]) = split_body
 );
 
-/// The first part, which has the corners of the cell.
 #[inline(always)]
 fn measure_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
     octants.rows.clear();
     for &slot in list {
+        let frame = tree.frame_at(slot);
         let mut row = [[0.0; LANES]; PARTS];
-        tree.frame_at(slot).distances_squared::<F, LANES>(octants.base, &octants.offsets[0], &mut row[0]);
+        for part in 0..PARTS {
+            frame.distances_squared::<F, LANES>(octants.base, &octants.offsets[part], &mut row[part]);
+        }
         octants.rows.push(row);
     }
 }
@@ -152,7 +160,7 @@ fn measure_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
 fn reaches(octants: &Octants, lanes: &[[u8; CORNERS]; 2], feet: &[[DVec3; CORNERS]; 2]) -> Reach {
     let offsets = Offsets::<LANES>::from_fn(|lane| {
         let at = usize::from(lanes[lane / CORNERS][lane % CORNERS]);
-        DVec3::new(octants.points.x[at], octants.points.y[at], octants.points.z[at]) - octants.base
+        octants.points[at] - octants.base
     });
     let mut reach = [[0.0f32; LANES]; CORNERS];
     for (witness, reach) in reach.iter_mut().enumerate() {
@@ -167,45 +175,44 @@ fn reaches(octants: &Octants, lanes: &[[u8; CORNERS]; 2], feet: &[[DVec3; CORNER
     reach
 }
 
-/// A bit for each corner of two octants by which a triangle stays; without any of an octant's it leaves.
+/// Whether a triangle stays in the lists of two octants, 1 or 0: each witness leaves a corner's bit.
 #[inline(always)]
-fn stays<F: Fuse>(row: &[f32; LANES], reach: &Reach) -> (bool, bool) {
+fn stays<F: Fuse>(row: &[f32; LANES], reach: &Reach) -> (usize, usize) {
     let (mut low, mut high) = (true, true);
-    // Most leave by the first of the witnesses.
-    for half in reach.chunks_exact(CORNERS / 2) {
-        for witness in half {
-            let mask = F::mask_not_above(row, witness);
-            low &= mask & 0xff != 0;
-            high &= mask & 0xff00 != 0;
-        }
-        if !(low | high) {
-            break;
-        }
+    // Without a branch, which nothing could foretell.
+    for witness in reach {
+        let mask = F::mask_not_above(row, witness);
+        low &= mask & 0xff != 0;
+        high &= mask & 0xff00 != 0;
     }
-    (low, high)
+    (usize::from(low), usize::from(high))
 }
 
 #[inline(always)]
-fn shorten_body<F: Fuse>(octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) {
+fn shorten_body<F: Fuse>(tree: &Tree, octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) {
+    let Octants { base, rows, offsets, .. } = octants;
+    rows.clear();
     let mut kept = 0;
     for at in 0..list.len() {
-        let row = octants.rows[at];
-        if stays::<F>(&row[0], reach).0 {
-            (list[kept], octants.rows[kept]) = (list[at], row);
-            kept += 1;
-        }
+        // The first part has the corners of the cell.
+        let (slot, mut row) = (list[at], [[0.0; LANES]; PARTS]);
+        tree.frame_at(slot).distances_squared::<F, LANES>(*base, &offsets[0], &mut row[0]);
+        list[kept] = slot;
+        kept += stays::<F>(&row[0], reach).0;
+        rows.push(row);
+        rows.truncate(kept);
     }
     list.truncate(kept);
-    octants.rows.truncate(kept);
+    for (&slot, row) in list.iter().zip(rows) {
+        tree.frame_at(slot).distances_squared::<F, LANES>(*base, &offsets[1], &mut row[1]);
+    }
 }
 
 #[inline(always)]
 fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
-    let Octants { base, rows, offsets, points, answers, error } = octants;
-    *answers = Answers::NONE;
+    let Octants { rows, points, feet, error, .. } = octants;
     let mut least = [[f32::INFINITY; LANES]; PARTS];
-    for (&slot, row) in list.iter().zip(rows.iter_mut()) {
-        tree.frame_at(slot).distances_squared::<F, LANES>(*base, &offsets[1], &mut row[1]);
+    for row in rows.iter() {
         for part in 0..PARTS {
             for lane in 0..LANES {
                 least[part][lane] = if row[part][lane] < least[part][lane] { row[part][lane] } else { least[part][lane] };
@@ -220,38 +227,41 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
     // The cell's own corners are known, and beyond the last node are none.
     least[0][..CORNERS].fill(-1.0);
     least[1][NODES - LANES..].fill(-1.0);
+    feet.clear();
     for (&slot, row) in list.iter().zip(rows.iter()) {
-        exact_near::<F>(tree, points, slot, row, &least, answers);
+        feet.choose(slot, F::mask_not_above(&row[0], &least[0]) | F::mask_not_above(&row[1], &least[1]) << LANES);
     }
+    feet.find(tree, points);
 }
 
 #[inline(always)]
-fn split_body<F: Fuse>(octants: &Octants, pair: &[usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
+fn split_body<F: Fuse>(octants: &Octants, pair: [usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; 2]) {
     let lanes = [PICK[pair[0]], PICK[pair[1]]];
     let mut around = [[DVec3::ZERO; CORNERS]; 2];
     for lane in 0..LANES {
         around[lane / CORNERS][lane % CORNERS] = feet[node(pair[lane / CORNERS], lane % CORNERS)];
     }
     let reach = reaches(octants, &lanes, &around);
-    let mut left = std::mem::take(&mut out[pair[0]]);
-    let mut right = std::mem::take(&mut out[pair[1]]);
-    let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane / CORNERS][lane % CORNERS]));
-    for (&slot, row) in list.iter().zip(&octants.rows) {
-        let (low, high) = stays::<F>(&F::pick(row, &lanes), &reach);
-        if low {
-            left.push(slot);
-        }
-        if high {
-            right.push(slot);
-        }
+    for out in out.iter_mut() {
+        out.clear();
+        out.resize(list.len(), Slot(0));
     }
-    out[pair[1]] = right;
-    out[pair[0]] = left;
+    let [left, right] = out;
+    let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane / CORNERS][lane % CORNERS]));
+    let mut kept = (0, 0);
+    for (&slot, row) in list.iter().zip(&octants.rows) {
+        (left[kept.0], right[kept.1]) = (slot, slot);
+        let (low, high) = stays::<F>(&F::pick(row, &lanes), &reach);
+        kept = (kept.0 + low, kept.1 + high);
+    }
+    left.truncate(kept.0);
+    right.truncate(kept.1);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::Candidate;
     use crate::laws::Random;
     use crate::mesh::TriangleMesh;
     use crate::run::Run;
@@ -295,15 +305,17 @@ mod tests {
                 let found = nodes.map(|p| judge(&tree, p));
                 let feet = std::array::from_fn(|n| tree.facet(found[n].triangle).nearest(nodes[n]).point);
                 let mut list: Vec<Slot> = (0..tree.len() as u32).map(Slot).collect();
-                octants.measure(&tree, &cell, &nodes, &list);
                 if round % 2 == 0 {
-                    octants.shorten(&std::array::from_fn(|corner| feet[node(corner, corner)]), &mut list);
+                    octants.shorten(&tree, &cell, &nodes, &std::array::from_fn(|corner| feet[node(corner, corner)]), &mut list);
                     assert!(list.is_sorted() && !list.is_empty());
                     shortened += tree.len() - list.len();
+                } else {
+                    octants.measure(&tree, &cell, &nodes, &list);
                 }
                 let answers = octants.nearest(&tree, &list);
                 for n in (0..NODES).filter(|n| (0..CORNERS).all(|corner| node(corner, corner) != *n)) {
-                    assert_eq!(answers[n], found[n], "node {n} of {cell:?}, {count} triangles of {size}");
+                    assert_eq!(answers[n].nearest, found[n], "node {n} of {cell:?}, {count} triangles of {size}");
+                    assert_eq!(answers[n].foot, feet[n], "node {n} of {cell:?}, {count} triangles of {size}");
                 }
                 let wanted = random.below(256) as u8;
                 let mut lists: [Vec<Slot>; OCTANTS] = std::array::from_fn(|_| vec![Slot(u32::MAX)]);

@@ -3,7 +3,7 @@
 //! Let u be the unsigned distance, I its interpolation from the corners c of a cell with half diagonal R, and d(T) the
 //! distance to one triangle of the cell's complete list. Interpolation keeps order, and the interpolation of an affine
 //! function is the function itself.
-//! 1. u^2 - |p|^2 is the least of affine functions, so concave: u^2 >= I(u^2) - I(|p|^2) + |p|^2 >= I(u)^2 - S; see `spread`.
+//! 1. u^2 - |p|^2 is the least of affine functions, so concave: u^2 >= I(u^2) - I(|p|^2) + |p|^2 >= I(u)^2 - S; see `below`.
 //! 2. u is at most the distance to any point or triangle of the surface, which is convex: u - I is at most the largest
 //!    d(T) - u at the corners. It is at most any mean of such distances too, so that where one of two is p too large at
 //!    some corners, and the other q at the rest, u - I is at most p q / (p + q); see `mixed`.
@@ -14,11 +14,12 @@
 //!    stays on one side, so that the plane's slope is a mean of the g (0 is in Clarke's subdifferential at a largest
 //!    value): p - q points along a mean of the normals around q, up or down, and is within a of m. Of these normals one at
 //!    least, of a triangle of the list, has n.(p - q) of at least |p - q| cos a in size; it is |p - q| at most.
-//! 5. There the gradient of the distance is within a of m, so within sin a of m cos a: the distance less an affine function
-//!    changes by at most sin a times as much as one moves, and between samples it is that much nearer to their
-//!    interpolation, which is exact for affine functions.
+//! 5. There the gradient of the distance is such a mean brought to length 1: see `planes`.
 
-use crate::bvh::cover::Range;
+use super::halves::of_part;
+use super::planes::{Plane, Slopes, between_planes};
+use crate::bvh::cover::{OCTANTS, Range};
+use crate::bvh::octants::NODES;
 use crate::bvh::tree::{Slot, Tree};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::simd::{Fuse, multiversion};
@@ -29,12 +30,6 @@ const SHORT: usize = 32;
 
 /// Longer lists are not looked through plane by plane.
 const PLANES: usize = 128;
-
-/// Normals whose cosine with their mean is less are not relied on.
-const STEEPEST: f64 = 0.1;
-
-/// Triangles flatter than this have no normal to rely on.
-const FLAT: f64 = 1e-6;
 
 /// A lattice point, in the tree's units.
 #[derive(Clone, Copy, Debug)]
@@ -70,33 +65,6 @@ pub(super) struct At<'a> {
 pub(super) struct Prover<'a> {
     surface: &'a Surface,
     planes: &'a [Plane],
-}
-
-/// The plane of a triangle.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
-    normal: DVec3,
-    point: DVec3,
-    /// One over the triangle's least height; infinite where there is no normal to rely on.
-    flat: f64,
-    /// What keeps its edges from meeting its neighbours', where the surface is whole around it whatever is near.
-    apart: Option<f64>,
-}
-
-impl Plane {
-    /// Those of all triangles, by slot.
-    pub fn all(surface: &Surface) -> Vec<Self> {
-        let tree = surface.tree();
-        let plane = |slot: u32| {
-            let facet = tree.facet_at(Slot(slot));
-            let cross = facet.ab.cross(facet.ac);
-            let longest = facet.ab.length_squared().max(facet.ac.length_squared()).max((facet.ac - facet.ab).length_squared()).sqrt();
-            let height = cross.length() / longest;
-            let flat = if height > FLAT * longest { 1.0 / height } else { f64::INFINITY };
-            Self { normal: cross / cross.length(), point: facet.a, flat, apart: surface.whole(tree.triangle(Slot(slot)), f64::MAX) }
-        };
-        (0..tree.len() as u32).map(plane).collect()
-    }
 }
 
 impl<'a> Prover<'a> {
@@ -138,15 +106,14 @@ impl<'a> Prover<'a> {
         known.widen(self.slack(&at.cell))
     }
 
-    /// Sharpens `known` by the planes of the list's triangles. Also returns how fast the distance less some affine function
-    /// can change, at most 1.
-    pub fn planes(&self, at: &At<'_>, known: Interval) -> (Interval, f64) {
+    /// Sharpens `known` by the planes of the list's triangles. Also returns which way the distance can change.
+    pub fn planes(&self, at: &At<'_>, known: Interval) -> (Interval, Option<Slopes>) {
         if at.list.len() > PLANES || !at.corners.iter().all(|corner| corner.certain) {
-            return (known, 1.0);
+            return (known, None);
         }
         match self.by_planes(at) {
-            Some((found, turn)) => (known.intersection(found.widen(self.slack(&at.cell))), turn),
-            None => (known, 1.0),
+            Some((found, slopes)) => (known.intersection(found.widen(self.slack(&at.cell))), Some(slopes)),
+            None => (known, None),
         }
     }
 
@@ -161,29 +128,24 @@ impl<'a> Prover<'a> {
         }
     }
 
-    /// 5: contains the distance minus what is told, which differ by what `differences` hold at samples `spacing` apart.
-    pub fn by_samples(&self, at: &At<'_>, differences: Interval, spacing: f64, turn: f64) -> Interval {
-        differences.widen(turn * 0.75f64.sqrt() * spacing * (1.0 + 1e-12) + self.slack(&at.cell))
+    /// 5: contains the distance minus what is told, which differ by so much at the corners of the parts.
+    pub fn by_samples(&self, at: &At<'_>, differences: &[f64; NODES], slopes: &Slopes) -> Interval {
+        let spacing = 0.5 * at.cell.size().x;
+        let part = |octant| slopes.between(&of_part(differences, octant), spacing);
+        (1..OCTANTS).fold(part(0), |known, octant| known.hull(part(octant))).widen(self.slack(&at.cell))
     }
 
-    /// 4 and 5: contains the signed distance minus the interpolation, and how fast it can leave an affine function; `None`
-    /// where the surface is not known to be sound.
-    fn by_planes(&self, at: &At<'_>) -> Option<(Interval, f64)> {
+    /// 4 and 5: contains the signed distance minus the interpolation, and which way it can change; `None` where the surface is
+    /// not known to be sound.
+    fn by_planes(&self, at: &At<'_>) -> Option<(Interval, Slopes)> {
         let turned = at.list.iter().try_fold(0.0f64, |turned, &slot| {
-            let plane = &self.planes[slot.0 as usize];
             let asked = || self.surface.whole(self.surface.tree().triangle(slot), at.range.upper);
-            let angle = plane.apart.or_else(asked)? * plane.flat;
-            angle.is_finite().then(|| turned.max(angle))
+            self.planes[slot.0 as usize].turned(asked).map(|angle| turned.max(angle))
         })?;
-        // With room for edges that meet but for rounding.
-        let cosine = cosine(self.planes, at.list) - 2.0 * turned - 1e-12;
-        if !(cosine > STEEPEST) {
-            return None;
-        }
-        let found = between_planes(self.planes, at.list, at.corners, &at.told, 1.0 / cosine);
-        let turn = (1.0 - cosine * cosine).sqrt();
-        let differences = hull(std::array::from_fn(|j| at.corners[j].value - at.told[j]));
-        Some((found.intersection(self.by_samples(at, differences, at.cell.size().x, turn)), turn))
+        let slopes = Slopes::of(self.planes, at.list, turned)?;
+        let found = between_planes(self.planes, at.list, at.corners, &at.told, slopes.stretch());
+        let differences = std::array::from_fn(|j| at.corners[j].value - at.told[j]);
+        Some((found.intersection(slopes.between(&differences, at.cell.size().x)), slopes))
     }
 
     /// Rounding of lengths within the cell and the surface.
@@ -227,18 +189,6 @@ fn by_triangles_body<F: Fuse>(tree: &Tree, at: &At<'_>, told: &[f64; 8], limit: 
     Interval { lower: ends(&lower).0, upper: mixed(&rows[..at.list.len()], limit) }
 }
 
-multiversion!(
-    /// The least cosine of the normals of a list with their mean.
-    fn cosine(planes: &[Plane], list: &[Slot]) -> f64 = cosine_body
-);
-
-#[inline(always)]
-fn cosine_body<F: Fuse>(planes: &[Plane], list: &[Slot]) -> f64 {
-    let normals = || list.iter().map(|&slot| planes[slot.0 as usize].normal);
-    let mean = normals().sum::<DVec3>().normalize_or_zero();
-    normals().map(|normal| normal.dot(mean)).fold(1.0, f64::min)
-}
-
 /// How often a better mean is looked for.
 const ROUNDS: usize = 8;
 
@@ -251,10 +201,8 @@ multiversion!(
 #[inline(always)]
 fn by_corners_body<F: Fuse>(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], edge: f64, limit: f64) -> Interval {
     let distances: [f64; 8] = std::array::from_fn(|j| corners[j].value.abs());
-    let (least, square) = (ends(&distances).0, spread(&distances, edge));
-    let below = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
     let difference = ends(&std::array::from_fn(|j| distances[j] - told[j])).0;
-    Interval { lower: difference - below, upper: above_feet(corners, feet, told, limit) }
+    Interval { lower: difference - below(&distances, edge, limit + difference), upper: above_feet(corners, feet, told, limit) }
 }
 
 #[inline(always)]
@@ -269,31 +217,6 @@ fn above_feet(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: 
         }
     }
     mixed(&rows, limit)
-}
-
-multiversion!(
-    /// The hull, at the corners, of what lies between the heights above the planes and `stretch` times as much, minus what is
-    /// told. The larger of two multiples of a height is convex, the lesser concave: what they are at corners bounds them.
-    fn between_planes(planes: &[Plane], list: &[Slot], corners: &[Corner; 8], told: &[f64; 8], stretch: f64) -> Interval = between_planes_body
-);
-
-#[inline(always)]
-fn between_planes_body<F: Fuse>(planes: &[Plane], list: &[Slot], corners: &[Corner; 8], told: &[f64; 8], stretch: f64) -> Interval {
-    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].point[axis]) };
-    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-    let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
-    for &slot in list {
-        let Plane { normal, point, .. } = planes[slot.0 as usize];
-        for lane in 0..8 {
-            let height = normal.x * (xs[lane] - point.x) + normal.y * (ys[lane] - point.y) + normal.z * (zs[lane] - point.z);
-            let most = height * stretch;
-            let (less, more) = if height < most { (height, most) } else { (most, height) };
-            low[lane] = if less < low[lane] { less } else { low[lane] };
-            high[lane] = if more > high[lane] { more } else { high[lane] };
-        }
-    }
-    let (low, high): ([f64; 8], [f64; 8]) = (std::array::from_fn(|j| low[j] - told[j]), std::array::from_fn(|j| high[j] - told[j]));
-    Interval { lower: ends(&low).0, upper: ends(&high).1 }
 }
 
 /// The largest number of a mean of the rows, whose weights are chosen so that it is small; stops at `limit`.
@@ -363,25 +286,67 @@ fn place_of(row: &[f64; 8], number: f64) -> usize {
     (0..8).rev().fold(0, |at, j| if row[j] == number { j } else { at })
 }
 
-/// At least |p|^2 less its interpolation, less what the interpolation of the squared distances is above the square of theirs.
+/// 1: at most so much less than their interpolation are unsigned distances in a cell of edge h; no sharper than `enough`.
 ///
-/// The latter is a variance, that of the part that is affine, with slopes b, less that of the rest: for coordinates t in a
-/// cell of edge h, sum of (1 - b^2) h^2 t (1 - t) and a rest that is small where the distances are nearly affine.
+/// Let U be the interpolation, an affine part that falls by b along the edges from its largest corner and a rest. For coordinates
+/// t the interpolation of the squares is U^2 and a variance, that of the affine part, sum of b^2 t (1 - t), but for what the
+/// rest makes of it, which is at most |b| times the rest. So u^2 >= U^2 - S, S = sum of (h^2 - b^2) t (1 - t) + |b| rest, and
+/// u >= U - e where S - 2 e U + e^2 <= 0: a sum over the axes that is largest where each is.
 #[inline(always)]
-fn spread(distances: &[f64; 8], edge: f64) -> f64 {
-    let mean = distances.iter().sum::<f64>() / 8.0;
+fn below(distances: &[f64; 8], edge: f64, enough: f64) -> f64 {
+    let least = ends(distances).0;
+    let (mean, falls, rest) = affine(distances);
+    let squares = falls.map(|fall| fall * fall);
+    let steep = (squares[0] + squares[1] + squares[2]).sqrt();
+    let widest = edge * edge * (1.0 + 1e-12);
+    let (mut spreads, mut more) = (squares.map(|square| (widest - square).max(0.0)), steep * rest * (1.0 + 1e-12));
+    let total = |spreads: &[f64; 3], more: f64| 0.25 * (spreads[0] + spreads[1] + spreads[2]) + more;
+    if total(&spreads, more) > 0.75 * widest {
+        (spreads, more) = ([widest; 3], 0.0);
+    }
+    let square = total(&spreads, more);
+    let plain = if least * least > square { least - (least * least - square).sqrt() } else { square.sqrt() };
+    let falls = falls.map(f64::abs);
+    let lowest = mean - 0.5 * (falls[0] + falls[1] + falls[2]) - rest;
+    let excess = |e: f64| {
+        let along = |axis: usize| {
+            let slope = (spreads[axis] - 2.0 * e * falls[axis]).max(0.0);
+            if slope > 0.0 { slope * slope / (4.0 * spreads[axis]) } else { 0.0 }
+        };
+        along(0) + along(1) + along(2) + more + e * e - 2.0 * e * lowest
+    };
+    let over = excess(plain);
+    if plain <= enough || !(lowest > 0.0 && over <= 0.0) {
+        return plain;
+    }
+    // The excess is convex: below its chord, above its tangent.
+    let tangent = square / (2.0 * lowest + falls[0] + falls[1] + falls[2]);
+    let ((low, above), (mut high, mut under)) = ((tangent, excess(tangent).max(0.0)), (plain, over));
+    for _ in 0..3 {
+        if above - under <= 0.0 {
+            break;
+        }
+        (high, under) = {
+            let chord = low + (high - low) * (above / (above - under)) * (1.0 + 1e-12);
+            (chord, excess(chord))
+        };
+    }
+    if under <= 0.0 { high } else { plain }
+}
+
+/// The affine function nearest to numbers at corners: its mean, how far it rises along each axis, and how far it is off.
+#[inline(always)]
+pub(super) fn affine(numbers: &[f64; 8]) -> (f64, [f64; 3], f64) {
+    let mean = numbers.iter().sum::<f64>() / 8.0;
     let side = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -0.5 } else { 0.5 };
-    let slopes: [f64; 3] = std::array::from_fn(|axis| (0..8).map(|corner| distances[corner] * side(corner, axis)).sum::<f64>() / 2.0);
-    let affine = |corner: usize| mean + (0..3).map(|axis| slopes[axis] * side(corner, axis)).sum::<f64>();
-    let rest = (0..8).map(|corner| (distances[corner] - affine(corner)).abs()).fold(0.0, f64::max);
-    // Weighted deviations of the affine part are at most half its range.
-    let range: f64 = 0.5 * slopes.iter().map(|slope| slope.abs()).sum::<f64>();
-    let square = slopes.iter().map(|slope| (edge * edge - slope * slope).max(0.0)).sum::<f64>() / 4.0 + 2.0 * range * rest;
-    square.min(0.75 * edge * edge) * (1.0 + 1e-12)
+    let rises: [f64; 3] = std::array::from_fn(|axis| (0..8).map(|corner| numbers[corner] * side(corner, axis)).sum::<f64>() / 2.0);
+    let affine = |corner: usize| mean + (0..3).map(|axis| rises[axis] * side(corner, axis)).sum::<f64>();
+    let rest = (0..8).map(|corner| (numbers[corner] - affine(corner)).abs()).fold(0.0, f64::max);
+    (mean, rises, rest)
 }
 
 #[inline(always)]
-fn ends(values: &[f64; 8]) -> (f64, f64) {
+pub(super) fn ends(values: &[f64; 8]) -> (f64, f64) {
     (-highest(&values.map(|v| -v)), highest(values))
 }
 
@@ -434,8 +399,9 @@ mod tests {
     }
 
     #[test]
-    fn feet_bound_the_distance_to_any_cloud_between_what_is_told() {
+    fn corners_and_feet_bound_the_distance_to_any_cloud() {
         let mut random = Random::new(7);
+        let (mut sharper, mut closest) = (0, 0.0);
         for case in 0..500 {
             let size = random.length(1e-2, 10.0);
             let cloud: Vec<DVec3> = (0..1 + random.below(20)).map(|_| random.direction() * random.between(0.5, 2.0)).collect();
@@ -449,11 +415,19 @@ mod tests {
             let told = corners.map(|corner| corner.value + random.between(-0.01, 0.01));
             let feet = std::array::from_fn(|k| corners[k % 8].foot);
             let bound = above_feet(&corners, &feet, &told, f64::NEG_INFINITY);
+            let distances = corners.map(|corner| corner.value);
+            let (sharp, plain) = (below(&distances, size, f64::NEG_INFINITY), below(&distances, size, f64::INFINITY));
+            assert!(sharp <= plain, "{case}: {sharp} and {plain}");
+            sharper += usize::from(sharp < 0.8 * plain);
             for _ in 0..100 {
                 let at = DVec3::new(random.unit(), random.unit(), random.unit());
-                let found = nearest(cell.min + cell.size() * at) - interpolate(&told, at);
+                let truth = nearest(cell.min + cell.size() * at);
+                let (found, under) = (truth - interpolate(&told, at), interpolate(&distances, at) - truth);
                 assert!(found <= bound + 1e-12 * size, "{case}: {found} at {at}, {bound}");
+                assert!(under <= sharp + 1e-12 * size, "{case}: {under} below at {at}, {sharp}");
+                closest = f64::max(closest, under / sharp);
             }
         }
+        assert!(sharper > 15 && closest > 0.9, "{sharper} are sharper, {closest} of what is allowed occurs");
     }
 }

@@ -6,11 +6,13 @@ use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::facets::{At, Corner, Plane, Prover};
+use super::facets::{At, Corner, Prover};
 use super::halves::{CENTER, Halves, INNER, blend, of_part, steps};
+use super::planes::Plane;
 use super::{Rule, Rules};
 use crate::bvh::Candidate;
 use crate::bvh::cover::{OCTANTS, Range, Scratch, gather_few};
+use crate::bvh::feet::Found;
 use crate::bvh::octants::{NODES, Octants, node};
 use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
@@ -336,11 +338,12 @@ impl<'a> Builder<'a> {
         let few = list.is_empty() && self.gather(&seen, MOST, &mut own);
         let mut halves = Halves::new(seen.corners);
         if few {
-            self.measure(&seen.start, &seen.cell, &own);
-            self.octants.shorten(&seen.corners.map(|corner| corner.foot), &mut own);
+            let nodes = self.nodes(&seen.start);
+            self.octants.shorten(self.job.surface.tree(), &seen.cell, &nodes, &seen.corners.map(|corner| corner.foot), &mut own);
             self.answer(&seen.start, &mut halves, &own);
         } else if !list.is_empty() {
-            self.measure(&seen.start, &seen.cell, list);
+            let nodes = self.nodes(&seen.start);
+            self.octants.measure(self.job.surface.tree(), &seen.cell, &nodes, list);
             self.answer(&seen.start, &mut halves, list);
         } else {
             // The centre tells the range.
@@ -376,12 +379,11 @@ impl<'a> Builder<'a> {
         if !list.is_empty() {
             // The cheapest look at the list says enough where the surface is smooth.
             let at = seen.at(Some(halves.corner(CENTER).foot), list);
-            let (mut known, turn) = self.prover.planes(&at, seen.known);
+            let (mut known, slopes) = self.prover.planes(&at, seen.known);
             let certain = (0..NODES).all(|number| halves.corner(number).certain);
-            if certain && turn < 1.0 && !within(known, seen.limit) {
-                let differences = (0..NODES).map(|number| Interval::exact(halves.corner(number).value - blended[number]));
-                let differences = differences.fold(NOTHING, Interval::hull);
-                known = known.intersection(self.prover.by_samples(&at, differences, 0.5 * seen.cell.size().x, turn));
+            if let Some(slopes) = slopes.filter(|_| certain && !within(known, seen.limit)) {
+                let differences = std::array::from_fn(|number| halves.corner(number).value - blended[number]);
+                known = known.intersection(self.prover.by_samples(&at, &differences, &slopes));
             }
             seen.known = known;
         }
@@ -519,13 +521,12 @@ impl<'a> Builder<'a> {
         })
     }
 
-    /// Takes up a cell and its complete list.
-    fn measure(&mut self, start: &Start, cell: &Aabb, list: &[Slot]) {
-        let nodes = std::array::from_fn(|number| {
+    /// The corners of the parts of a cell.
+    fn nodes(&self, start: &Start) -> [DVec3; NODES] {
+        std::array::from_fn(|number| {
             let [x, y, z] = start.node(number);
             self.job.lattice.corner(x, y, z)
-        });
-        self.octants.measure(self.job.surface.tree(), cell, &nodes, list);
+        })
     }
 
     /// Fills in the corners of the parts of the cell that was taken up, from its complete list.
@@ -538,7 +539,8 @@ impl<'a> Builder<'a> {
             let place = start.node(number);
             let (p, answer) = (lattice.corner(place[0], place[1], place[2]), answers[number]);
             let found = || {
-                let side = start.side.or_else(|| if parted { side_by(surface, p, answer.distance_squared.sqrt(), &near) } else { None });
+                let distance = answer.nearest.distance_squared.sqrt();
+                let side = start.side.or_else(|| if parted { side_by(surface, p, distance, &near) } else { None });
                 found(surface, p, answer, side)
             };
             halves.set(number, if parted { found() } else { *self.corners.entry(key(place)).or_insert_with(found) });
@@ -580,19 +582,19 @@ fn corner(surface: &Surface, p: DVec3, near: &[Corner], side: Option<Side>) -> C
     let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
     let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
     let start = Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) };
-    found(surface, p, tree.nearest(p, start), side)
+    let nearest = tree.nearest(p, start);
+    found(surface, p, Found { nearest, foot: tree.facet(nearest.triangle).nearest(p).point }, side)
 }
 
 /// The point whose nearest triangle was found.
-fn found(surface: &Surface, p: DVec3, nearest: Candidate, side: Option<Side>) -> Corner {
+fn found(surface: &Surface, p: DVec3, Found { nearest, foot }: Found, side: Option<Side>) -> Corner {
     let tree = surface.tree();
-    let foot = tree.facet(nearest.triangle).nearest(p);
-    let side = side.unwrap_or_else(|| surface.side(p, &foot, nearest.triangle));
+    let side = side.unwrap_or_else(|| surface.side(p, &tree.facet(nearest.triangle).nearest(p), nearest.triangle));
     Corner {
-        value: side.sign() * foot.distance_squared.sqrt(),
+        value: side.sign() * nearest.distance_squared.sqrt(),
         certain: side.is_certain(),
         point: p,
-        foot: foot.point,
+        foot,
         near: tree.slots[nearest.triangle as usize],
     }
 }

@@ -8,6 +8,7 @@ mod coalesce;
 mod facets;
 mod halves;
 mod mesh;
+mod planes;
 pub(crate) mod verify;
 
 use crate::distance::{SampleBlock, Source};
