@@ -48,9 +48,14 @@ impl Feet {
         self.found.clear();
         self.found.resize(POINTS, Found { nearest: Candidate::within(f64::INFINITY), foot: DVec3::ZERO });
         let Self { pairs, groups, found } = self;
+        let count = pairs.len().div_ceil(WIDTH);
+        if groups.len() < count {
+            groups.resize(count, NOTHING);
+        }
         // All that is stored here has long been written when it is read.
-        groups.clear();
-        groups.extend(pairs.chunks(WIDTH).map(|group| gather(tree, group)));
+        for (group, packet) in pairs.chunks(WIDTH).zip(groups.iter_mut()) {
+            gather(tree, group, packet);
+        }
         for (group, packet) in pairs.chunks(WIDTH).zip(groups.iter()) {
             let mut p = [[0.0f64; WIDTH]; 3];
             for (lane, &(_, point)) in group.iter().enumerate() {
@@ -78,12 +83,22 @@ impl Feet {
     }
 }
 
+/// A group whose lanes are still to be filled.
+const NOTHING: Packet = Packet {
+    a: [[0.0; WIDTH]; 3],
+    ab: [[0.0; WIDTH]; 3],
+    ac: [[0.0; WIDTH]; 3],
+    v: [[0.0; WIDTH]; 3],
+    inverse: [[0.0; WIDTH]; 3],
+    slope: [0.0; WIDTH],
+    triangle: [0; WIDTH],
+    first: 0,
+    count: 0,
+};
+
 /// The triangles of a group in lanes; those beyond it are anything.
 #[inline(always)]
-fn gather(tree: &Tree, group: &[(Slot, u32)]) -> Packet {
-    let (zero, count) = ([[0.0; WIDTH]; 3], group.len() as u32);
-    let mut packet =
-        Packet { a: zero, ab: zero, ac: zero, v: zero, inverse: zero, slope: [0.0; WIDTH], triangle: [0; WIDTH], first: 0, count };
+fn gather(tree: &Tree, group: &[(Slot, u32)], packet: &mut Packet) {
     for (lane, &(slot, _)) in group.iter().enumerate() {
         let facet = tree.facet_at(slot);
         for axis in 0..3 {
@@ -96,5 +111,4 @@ fn gather(tree: &Tree, group: &[(Slot, u32)]) -> Packet {
         packet.slope[lane] = facet.slope;
         packet.triangle[lane] = tree.triangle(slot);
     }
-    packet
 }

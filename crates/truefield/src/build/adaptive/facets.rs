@@ -7,8 +7,8 @@
 //! 2. u is at most the distance to any point or triangle of the surface, which is convex: u - I is at most the largest
 //!    d(T) - u at the corners. It is at most any mean of such distances too, so that where one of two is p too large at
 //!    some corners, and the other q at the rest, u - I is at most p q / (p + q); see `mixed`.
-//! 3. u is one of the d(T), each of which lies above its tangent at the cell's centre: u - I is at least the least over T
-//!    of the least (tangent - u) at the corners.
+//! 3. u is one of the d(T), each of which lies above its tangents, at the cell's centre and at corners, and so above any mean of
+//!    them: u - I is at least the least over T of the least (mean - u) at the corners.
 //! 4. Near a sound piece of surface, signed: let all normals n of the list be within a of their mean m. Seen along m the
 //!    surface around q, which is nearest to p, is a graph of slopes g(n); it touches the plane across p - q there and
 //!    stays on one side, so that the plane's slope is a mean of the g (0 is in Clarke's subdifferential at a largest
@@ -21,7 +21,7 @@ use super::planes::{Plane, Slopes, between_planes};
 use crate::bvh::cover::{OCTANTS, Range};
 use crate::bvh::octants::NODES;
 use crate::bvh::tree::{Slot, Tree};
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, DVec3, Facet, Interval};
 use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
@@ -168,25 +168,57 @@ fn by_triangles_body<F: Fuse>(tree: &Tree, at: &At<'_>, told: &[f64; 8], limit: 
     let places: [DVec3; 8] = std::array::from_fn(|j| at.cell.corner(j));
     let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| places[j][axis]) };
     let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-    let mut lower = [f64::INFINITY; 8];
-    let mut rows = [[0.0; 8]; SHORT];
-    for (&slot, row) in at.list.iter().zip(&mut rows) {
+    let (mut rows, mut under) = ([[0.0; 8]; SHORT], [[0.0; 8]; SHORT]);
+    let mut plain = f64::INFINITY;
+    for (number, &slot) in at.list.iter().enumerate() {
         let facet = tree.facet_at(slot);
         for lane in 0..8 {
-            row[lane] = facet.distance_squared(DVec3::new(xs[lane], ys[lane], zs[lane])).sqrt() - told[lane];
+            rows[number][lane] = facet.distance_squared(DVec3::new(xs[lane], ys[lane], zs[lane])).sqrt() - told[lane];
         }
-        let foot = facet.foot(center);
-        let away = center - (facet.a + facet.ab * foot.s + facet.ac * foot.t);
-        let distance = foot.distance_squared.sqrt();
-        // On the triangle there is no tangent; zero is below.
-        let (base, slope) = if distance > 0.0 { (distance, away / distance) } else { (0.0, DVec3::ZERO) };
-        for lane in 0..8 {
-            let (x, y, z) = (xs[lane] - center.x, ys[lane] - center.y, zs[lane] - center.z);
-            let tangent = base + (slope.x * x + slope.y * y + slope.z * z) - told[lane];
-            lower[lane] = if tangent < lower[lane] { tangent } else { lower[lane] };
+        under[number] = under_tangent(facet, center, &places, told);
+        plain = plain.min(-highest(&under[number]));
+    }
+    let upper = mixed(&rows[..at.list.len()], limit);
+    if plain >= -limit || upper > limit {
+        return Interval { lower: plain, upper };
+    }
+    let mut lower = f64::INFINITY;
+    for (&slot, row) in at.list.iter().zip(&under) {
+        lower = lower.min(-above_tangents(tree.facet_at(slot), row, &places, told, limit));
+        if lower < -limit {
+            // No more is wanted of what fails.
+            return Interval { lower: plain, upper };
         }
     }
-    Interval { lower: ends(&lower).0, upper: mixed(&rows[..at.list.len()], limit) }
+    Interval { lower, upper }
+}
+
+/// The largest number of a mean of a tangent's row and of those where it is largest; stops at `limit`.
+#[inline(always)]
+fn above_tangents(facet: &Facet, row: &[f64; 8], places: &[DVec3; 8], told: &[f64; 8], limit: f64) -> f64 {
+    let (mut rows, mut least, mut high) = ([*row; 3], *row, highest(row));
+    for count in 1..3 {
+        if high <= limit {
+            break;
+        }
+        rows[count] = under_tangent(facet, places[place_of(&least, highest(&least))], places, told);
+        for lane in 0..8 {
+            least[lane] = if rows[count][lane] < least[lane] { rows[count][lane] } else { least[lane] };
+        }
+        high = mixed(&rows[..=count], limit);
+    }
+    high
+}
+
+/// What is told at the corners less the tangent of the distance to a triangle at `p`.
+#[inline(always)]
+fn under_tangent(facet: &Facet, p: DVec3, places: &[DVec3; 8], told: &[f64; 8]) -> [f64; 8] {
+    let foot = facet.foot(p);
+    let away = p - (facet.a + facet.ab * foot.s + facet.ac * foot.t);
+    let distance = foot.distance_squared.sqrt();
+    // On the triangle there is no tangent; zero is below.
+    let (base, slope) = if distance > 0.0 { (distance, away / distance) } else { (0.0, DVec3::ZERO) };
+    std::array::from_fn(|lane| told[lane] - (base + slope.dot(places[lane] - p)))
 }
 
 /// How often a better mean is looked for.
