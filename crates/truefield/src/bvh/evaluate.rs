@@ -129,14 +129,7 @@ fn evaluate_body<F: Fuse>(tree: &Tree, cell: &Aabb, points: &Points, list: &[Slo
 
 /// Offers a triangle to the points for which its filtered squared distance is not above a limit.
 #[inline(always)]
-fn exact_near<F: Fuse>(
-    tree: &Tree,
-    points: &Points,
-    slot: Slot,
-    squared: &[[f32; LANES]],
-    limits: &[[f32; LANES]],
-    out: &mut Answers,
-) {
+fn exact_near<F: Fuse>(tree: &Tree, points: &Points, slot: Slot, squared: &[[f32; LANES]], limits: &[[f32; LANES]], out: &mut Answers) {
     let mut chosen = [0u8; BLOCK + LANES];
     let mut count = 0;
     for (part, (squared, limits)) in squared.iter().zip(limits).enumerate() {

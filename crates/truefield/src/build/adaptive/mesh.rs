@@ -202,6 +202,21 @@ impl Seen<'_> {
     }
 }
 
+/// A part of a cell, and what follows from its corners.
+struct Part {
+    start: Start,
+    cell: Aabb,
+    corners: [Corner; 8],
+}
+
+impl Part {
+    /// What is told by the cell that it is a part of.
+    fn at<'b>(&'b self, told: [f64; 8], list: &'b [Slot]) -> At<'b> {
+        let Start { range, side, .. } = self.start;
+        At { cell: self.cell, range, side, corners: &self.corners, center: None, told, list }
+    }
+}
+
 /// A bit for each part of which something holds.
 fn bits(holds: impl Fn(usize) -> bool) -> u8 {
     (0..OCTANTS).fold(0, |bits, octant| bits | u8::from(holds(octant)) << octant)
@@ -209,13 +224,6 @@ fn bits(holds: impl Fn(usize) -> bool) -> u8 {
 
 fn within(error: Interval, limit: f64) -> bool {
     error.upper <= limit && error.lower >= -limit
-}
-
-/// What is proven of the parts of a cell, as far as the first that fails.
-struct Proof {
-    /// Contains the distance minus what is told.
-    known: Interval,
-    parts: [Option<Interval>; OCTANTS],
 }
 
 /// Lists of parts of a cell, of which there is a bit each.
@@ -239,6 +247,7 @@ struct Builder<'a> {
     /// Lists that no cell uses at present.
     lists: Vec<Parts>,
     owned: Vec<Vec<Slot>>,
+    parts: Vec<Vec<Part>>,
 }
 
 impl<'a> Builder<'a> {
@@ -253,6 +262,7 @@ impl<'a> Builder<'a> {
             octants: Octants::default(),
             lists: Vec::new(),
             owned: Vec::new(),
+            parts: Vec::new(),
         }
     }
 
@@ -260,28 +270,36 @@ impl<'a> Builder<'a> {
     fn tile(&mut self, index: [i64; 3], edge: i64, run: &Run<'_>) -> Result<()> {
         let low = index.map(|index| index * edge);
         let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], None));
-        self.divide(self.see(Start { low, edge, side: None, range: Range::ALL }, &corners), &[], run)
+        let start = Start { low, edge, side: None, range: Range::ALL };
+        let cell = start.cell(self.job.lattice);
+        let tile = Part { start: self.look(start, &cell, &corners), cell, corners };
+        self.divide(self.see(&tile), &[], run)
     }
 
-    /// Looks at a cell: its range and its side.
-    fn look(&self, start: Start, corners: &[Corner; 8]) -> (Start, Aabb) {
-        let (cell, mut start) = self.part(start, corners);
+    /// What follows for a cell from its corners: its range and its side.
+    fn look(&self, start: Start, cell: &Aabb, corners: &[Corner; 8]) -> Start {
+        let mut start = start.within(self.prover.range(cell, corners));
+        if start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only() {
+            start.side = one_side(corners);
+        }
+        start
+    }
+
+    /// The side of a cell by a ball around it, where sides change elsewhere too.
+    fn settle(&self, mut start: Start, cell: &Aabb, corners: &[Corner; 8]) -> Start {
         let surface = self.job.surface;
         if start.side.is_none() && start.range.lower > 0.0 && !surface.side_changes_at_surface_only() {
             let center = corner(surface, cell.center(), corners, None);
             start.side = side_of_ball(surface, &center, cell.radius() * (1.0 + 1e-12));
         }
-        (start, cell)
+        start
     }
 
-    /// A part of a cell, and what follows from its corners.
-    fn part(&self, start: Start, corners: &[Corner; 8]) -> (Aabb, Start) {
-        let cell = start.cell(self.job.lattice);
-        let mut start = start.within(self.prover.range(&cell, corners));
-        if start.side.is_none() && start.range.lower > 0.0 && self.job.surface.side_changes_at_surface_only() {
-            start.side = one_side(corners);
-        }
-        (cell, start)
+    /// The parts of a cell whose corners are known.
+    fn part(&self, start: &Start, halves: &Halves, octant: usize) -> Part {
+        let (part, corners) = (start.part(octant), halves.corners(octant));
+        let cell = part.cell(self.job.lattice);
+        Part { start: self.look(part, &cell, &corners), cell, corners }
     }
 
     /// The largest error of a cell, in the tree's units.
@@ -291,13 +309,14 @@ impl<'a> Builder<'a> {
     }
 
     /// What a cell says, and what follows from its corners.
-    fn see<'b>(&self, start: Start, corners: &'b [Corner; 8]) -> Seen<'b> {
+    fn see<'b>(&self, part: &'b Part) -> Seen<'b> {
         let scale = self.job.surface.scale();
-        let (start, cell) = self.look(start, corners);
+        let Part { start, cell, corners } = part;
+        let start = self.settle(*start, cell, corners);
         let values = corners.map(|corner| (corner.value / scale) as f32);
         let told = values.map(|v| f64::from(v) * scale);
         let limit = self.allowed(&start);
-        let mut seen = Seen { start, cell, corners, values, told, limit, known: Interval::ALL };
+        let mut seen = Seen { start, cell: *cell, corners, values, told, limit, known: Interval::ALL };
         seen.known = self.prover.coarse(&seen.at(None, &[]), limit);
         seen
     }
@@ -352,24 +371,28 @@ impl<'a> Builder<'a> {
         let list = if few { own.as_slice() } else { list };
         let center = halves.corner(CENTER);
         let (far, radius) = (center.value.abs(), seen.cell.radius() * (1.0 + 1e-12));
-        seen.start = self.look(seen.start.within(Range { lower: far - radius, upper: far + radius }), seen.corners).0;
+        let start = seen.start.within(Range { lower: far - radius, upper: far + radius });
+        seen.start = self.settle(self.look(start, &seen.cell, seen.corners), &seen.cell, seen.corners);
         seen.limit = self.allowed(&seen.start);
+        let mut parts = self.parts.pop().unwrap_or_default();
+        parts.clear();
         let (leaf, lists) = match self.job.leaves {
             Leaves::Exact => (seen.start.range.lower >= FAR * seen.cell.radius() || (1..=LIST).contains(&list.len()), None),
-            Leaves::Linear => self.prove(&mut seen, &mut halves, list),
+            Leaves::Linear => self.prove(&mut seen, &mut halves, list, &mut parts),
         };
         let done = if leaf {
             self.lists.extend(lists);
             self.push_leaf(&seen, list, run)
         } else {
-            self.branch(&seen, &mut halves, list, lists, run)
+            self.branch(&seen, &mut halves, list, lists, &mut parts, run)
         };
         self.owned.push(own);
+        self.parts.push(parts);
         done
     }
 
     /// Whether a cell with linear leaves need not be divided; and the lists of its parts, where they were needed to know.
-    fn prove(&mut self, seen: &mut Seen<'_>, halves: &mut Halves, list: &[Slot]) -> (bool, Option<Parts>) {
+    fn prove(&mut self, seen: &mut Seen<'_>, halves: &mut Halves, list: &[Slot], parts: &mut Vec<Part>) -> (bool, Option<Parts>) {
         let blended = blend(&seen.told);
         // A sample that is too far off ends the hope.
         if !self.is_close(&seen.start, halves, &blended, seen.limit) {
@@ -390,36 +413,53 @@ impl<'a> Builder<'a> {
         if seen.is_within() {
             return (true, None);
         }
-        let proof = self.prove_parts(&seen.start, halves, &blended, seen.limit);
-        seen.known = seen.known.intersection(proof.known);
+        parts.extend((0..OCTANTS).map(|octant| self.part(&seen.start, halves, octant)));
+        let limit = seen.limit;
+        let coarse = |prover: &Prover<'_>, octant: usize| prover.coarse(&parts[octant].at(of_part(&blended, octant), &[]), limit);
+        // Parts are looked at one by one. The first that fails decides, unless its list or the cell's says more.
+        let mut by_corners = [Interval::ALL; OCTANTS];
+        let mut failing = None;
+        for (octant, known) in by_corners.iter_mut().enumerate() {
+            *known = coarse(&self.prover, octant);
+            if self.fails(*known, limit) {
+                failing = Some(octant);
+                break;
+            }
+        }
+        if failing.is_none() {
+            seen.known = seen.known.intersection(by_corners.into_iter().fold(NOTHING, Interval::hull));
+        }
         if !samples && !list.is_empty() && !seen.is_within() {
-            seen.known = self.prover.triangles(&seen.at(None, list), seen.known, seen.limit);
+            seen.known = self.prover.triangles(&seen.at(None, list), seen.known, limit);
         }
         if seen.is_within() || list.is_empty() {
             return (samples || seen.is_within(), None);
         }
-        let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
-        let parts: [_; OCTANTS] = std::array::from_fn(|octant| {
-            let (cell, part) = self.part(seen.start.part(octant), &corners[octant]);
-            let told = of_part(&blended, octant);
-            let at = At { cell, range: part.range, side: part.side, corners: &corners[octant], center: None, told, list: &[] };
-            let known = proof.parts[octant].unwrap_or_else(|| self.prover.coarse(&at, seen.limit));
-            (at, known)
-        });
-        let wanted = bits(|octant| !within(parts[octant].1, seen.limit));
-        let lists = self.split(wanted, halves, list, None);
-        let mut whole = NOTHING;
-        for (octant, (at, known)) in parts.into_iter().enumerate() {
-            let mut known = known;
-            if wanted >> octant & 1 == 1 {
-                let at = At { list: &lists.lists[octant], ..at };
-                known = self.prover.planes(&at, known).0;
-                if !samples && !within(known, seen.limit) {
-                    known = self.prover.triangles(&at, known, seen.limit);
-                }
+        let mut lists = None;
+        let by_list = |prover: &Prover<'_>, octant: usize, known: Interval, lists: &Parts| {
+            let at = parts[octant].at(of_part(&blended, octant), &lists.lists[octant]);
+            let known = prover.planes(&at, known).0;
+            if samples || within(known, limit) { known } else { prover.triangles(&at, known, limit) }
+        };
+        if let Some(failing) = failing {
+            let few = self.split(1 << failing, halves, list, None);
+            by_corners[failing] = by_list(&self.prover, failing, by_corners[failing], &few);
+            lists = Some(few);
+            if self.fails(by_corners[failing], limit) {
+                return (false, lists);
             }
+            for octant in failing + 1..OCTANTS {
+                by_corners[octant] = coarse(&self.prover, octant);
+            }
+        }
+        let wanted = bits(|octant| !within(by_corners[octant], limit));
+        let lists = self.split(wanted, halves, list, lists);
+        let mut whole = NOTHING;
+        for octant in 0..OCTANTS {
+            let known = by_corners[octant];
+            let known = if wanted >> octant & 1 == 1 { by_list(&self.prover, octant, known, &lists) } else { known };
             whole = whole.hull(known);
-            if self.fails(known, seen.limit) {
+            if self.fails(known, limit) {
                 whole = Interval::ALL;
                 break;
             }
@@ -437,26 +477,6 @@ impl<'a> Builder<'a> {
             parts.listed |= missing;
         }
         parts
-    }
-
-    /// Proves the parts of a cell one by one by their corners. Where one fails a cell will be divided, or its list is looked
-    /// at, unless samples are enough.
-    fn prove_parts(&self, start: &Start, halves: &Halves, told: &[f64; NODES], limit: f64) -> Proof {
-        let mut proof = Proof { known: NOTHING, parts: [None; OCTANTS] };
-        for octant in 0..OCTANTS {
-            let corners = halves.corners(octant);
-            let (cell, start) = self.part(start.part(octant), &corners);
-            let at =
-                At { cell, range: start.range, side: start.side, corners: &corners, center: None, told: of_part(told, octant), list: &[] };
-            let part = self.prover.coarse(&at, limit);
-            proof.parts[octant] = Some(part);
-            proof.known = proof.known.hull(part);
-            if self.fails(part, limit) {
-                proof.known = Interval::ALL;
-                break;
-            }
-        }
-        proof
     }
 
     /// Whether a part that is not proven any better decides that the cell is divided.
@@ -477,12 +497,22 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Stores a cell and divides it.
-    fn branch(&mut self, seen: &Seen<'_>, halves: &mut Halves, list: &[Slot], lists: Option<Parts>, run: &Run<'_>) -> Result<()> {
+    /// Stores a cell and divides it; `parts` are its parts, or none where they have not been looked at.
+    fn branch(
+        &mut self,
+        seen: &Seen<'_>,
+        halves: &mut Halves,
+        list: &[Slot],
+        lists: Option<Parts>,
+        parts: &mut Vec<Part>,
+        run: &Run<'_>,
+    ) -> Result<()> {
         self.push(seen, LevelKind::Branch, run)?;
-        (0..NODES).for_each(|number| self.ask(&seen.start, halves, number));
-        let corners: [_; OCTANTS] = std::array::from_fn(|octant| halves.corners(octant));
-        let parts: [_; OCTANTS] = std::array::from_fn(|octant| self.see(seen.start.part(octant), &corners[octant]));
+        if parts.is_empty() {
+            (0..NODES).for_each(|number| self.ask(&seen.start, halves, number));
+            parts.extend((0..OCTANTS).map(|octant| self.part(&seen.start, halves, octant)));
+        }
+        let parts: [_; OCTANTS] = std::array::from_fn(|octant| self.see(&parts[octant]));
         let wanted = bits(|octant| !self.is_proven(&parts[octant]));
         let lists = self.split(wanted, halves, list, lists);
         for (octant, part) in parts.into_iter().enumerate() {
