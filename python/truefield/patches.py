@@ -36,8 +36,8 @@ def surface(
         threads: number of threads; all cores by default.
         progress: called as `progress(phase, fraction)`.
 
-    A distance takes one or two microseconds on one core, three or four within a thousandth of the size. Points as far from
-    a large part of the surface as from its nearest point, like the middle of a ball, take longer and have wider bounds.
+    A distance to the teapot's parts takes one to three microseconds on one core. Points as far from a large part of the
+    surface as from its nearest point, like the middle of a ball, take longer and have wider bounds.
 
     Raises:
         TruefieldError: the array has another shape or numbers that are not finite, or the patches do not close up;

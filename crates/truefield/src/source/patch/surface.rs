@@ -29,9 +29,9 @@ pub enum Sides {
 /// A set of bicubic Bezier patches, and its distance to 1e-11 of its size.
 ///
 /// A query goes through parts of patches, nearest first. Where the squared distance is convex over a part, as its control
-/// numbers prove, Newton's method finds the nearest point and the slope there proves that none is nearer. That takes one or
-/// two microseconds, and next to the surface, where sides are wanted, up to two more; of a point from which much of the surface
-/// is as near, as from an axis of revolution, thousands of parts may be looked at.
+/// numbers prove, Newton's method finds the nearest point and the slope there proves that none is nearer. Of a teapot that takes
+/// one to three microseconds, with its side; of a point from which much of the surface is as near, as from an axis of
+/// revolution, thousands of parts may be looked at.
 ///
 /// Sides come from triangles: farther from the patches than the triangles are from them, both have the same side; nearer,
 /// balls that certainly hold no surface lead away from it.
