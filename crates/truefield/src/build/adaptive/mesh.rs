@@ -33,7 +33,7 @@ const DEEPEST: u32 = 20;
 const LIST: usize = 12;
 
 /// Longer lists are not kept: the tree is quicker.
-const LONGEST: usize = 64;
+const LONGEST: usize = 14;
 
 /// Triangles of a cell that is not divided are listed where there are no more than this.
 const LISTED: usize = 128;
