@@ -16,6 +16,7 @@
 //!    least, of a triangle of the list, has n.(p - q) of at least |p - q| cos a in size; it is |p - q| at most.
 //! 5. There the gradient of the distance is such a mean brought to length 1: see `planes`.
 
+use super::corner::Corner;
 use super::halves::of_part;
 use super::planes::{Plane, Slopes, between_planes};
 use crate::bvh::cover::{OCTANTS, Range};
@@ -30,20 +31,6 @@ const SHORT: usize = 32;
 
 /// Longer lists are not looked through plane by plane.
 const PLANES: usize = 128;
-
-/// A lattice point, in the tree's units.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Corner {
-    /// Signed distance.
-    pub value: f64,
-    /// Whether its sign is.
-    pub certain: bool,
-    pub point: DVec3,
-    /// The nearest point of the surface.
-    pub foot: DVec3,
-    /// Its triangle.
-    pub near: Slot,
-}
 
 /// A cell, and what is known of it.
 pub(super) struct At<'a> {

@@ -1,6 +1,6 @@
 //! The 27 corners of the parts of a cell.
 
-use super::facets::Corner;
+use super::corner::Corner;
 use crate::bvh::octants::{NODES, node};
 use crate::geom::DVec3;
 

@@ -6,18 +6,18 @@ use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::facets::{At, Corner, Prover};
-use super::halves::{CENTER, Halves, INNER, blend, of_part, steps};
+use super::cell::{Part, Seen, Start, place, within};
+use super::corner::{Corner, corner, found, list_side, one_side, side_by, side_of_ball};
+use super::facets::Prover;
+use super::halves::{CENTER, Halves, INNER, blend, of_part};
 use super::planes::Plane;
 use super::{Rule, Rules};
-use crate::bvh::Candidate;
 use crate::bvh::cover::{OCTANTS, Range, Scratch, gather_few};
-use crate::bvh::feet::Found;
 use crate::bvh::octants::{NODES, Octants, node};
 use crate::bvh::tree::Slot;
 use crate::error::{Error, Result};
 use crate::field::Continuity;
-use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind, Levels, ListSide, Record, Root, derive_errors};
+use crate::field::adaptive::{AdaptiveField, Coverage, Division, Level, LevelKind, Levels, Record, Root, derive_errors};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::grid::Grid;
 use crate::run::Run;
@@ -44,9 +44,6 @@ const MOST: usize = 1024;
 /// Exact leaves this many times their half diagonal away are not divided for the sake of their lists, which are as long in
 /// the parts.
 const FAR: f64 = 3.0;
-
-/// Nearer to the surface than this part of its size every point's side is asked by itself.
-const ASKED: f64 = 1e-6;
 
 /// What no number is in.
 const NOTHING: Interval = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
@@ -131,99 +128,9 @@ struct Job<'a> {
     cells: AtomicU64,
 }
 
-/// A cell to be judged, and what its parent knew.
-#[derive(Clone, Copy)]
-struct Start {
-    /// Lattice indices of its lowest corner.
-    low: [i64; 3],
-    /// In lattice cells.
-    edge: i64,
-    /// The side of all its points, where that is known.
-    side: Option<Side>,
-    /// Of unsigned distances in it.
-    range: Range,
-}
-
-/// Lattice indices of a corner of the cell from `low` on.
-fn place(low: [i64; 3], edge: i64, corner: usize) -> [i64; 3] {
-    [0, 1, 2].map(|axis| low[axis] + (corner >> axis & 1) as i64 * edge)
-}
-
-impl Start {
-    fn cell(&self, lattice: &Grid) -> Aabb {
-        let at = |corner| {
-            let [x, y, z] = place(self.low, self.edge, corner);
-            lattice.corner(x, y, z)
-        };
-        Aabb::new(at(0), at(7))
-    }
-
-    /// One of eight parts, of which all that is known holds.
-    fn part(&self, octant: usize) -> Self {
-        let half = self.edge / 2;
-        Self { low: place(self.low, half, octant), edge: half, ..*self }
-    }
-
-    /// Lattice indices of a corner of its parts.
-    fn node(&self, number: usize) -> [i64; 3] {
-        let steps = steps(number);
-        [0, 1, 2].map(|axis| self.low[axis] + steps[axis] * (self.edge / 2))
-    }
-
-    /// With what else is known of its range.
-    fn within(self, range: Range) -> Self {
-        Self { range: Range { lower: self.range.lower.max(range.lower), upper: self.range.upper.min(range.upper) }, ..self }
-    }
-}
-
-/// A cell, what it says and what is proven of it.
-struct Seen<'a> {
-    start: Start,
-    cell: Aabb,
-    corners: &'a [Corner; 8],
-    values: [f32; 8],
-    /// The values in the tree's units.
-    told: [f64; 8],
-    /// The largest error that is allowed.
-    limit: f64,
-    /// Contains the distance minus what is told.
-    known: Interval,
-}
-
-impl Seen<'_> {
-    fn at<'b>(&'b self, center: Option<DVec3>, list: &'b [Slot]) -> At<'b> {
-        let Start { range, side, .. } = self.start;
-        At { cell: self.cell, range, side, corners: self.corners, center, told: self.told, list }
-    }
-
-    /// Whether no more is asked of it.
-    fn is_within(&self) -> bool {
-        within(self.known, self.limit)
-    }
-}
-
-/// A part of a cell, and what follows from its corners.
-struct Part {
-    start: Start,
-    cell: Aabb,
-    corners: [Corner; 8],
-}
-
-impl Part {
-    /// What is told by the cell that it is a part of.
-    fn at<'b>(&'b self, told: [f64; 8], list: &'b [Slot]) -> At<'b> {
-        let Start { range, side, .. } = self.start;
-        At { cell: self.cell, range, side, corners: &self.corners, center: None, told, list }
-    }
-}
-
 /// A bit for each part of which something holds.
 fn bits(holds: impl Fn(usize) -> bool) -> u8 {
     (0..OCTANTS).fold(0, |bits, octant| bits | u8::from(holds(octant)) << octant)
-}
-
-fn within(error: Interval, limit: f64) -> bool {
-    error.upper <= limit && error.lower >= -limit
 }
 
 /// Lists of parts of a cell, of which there is a bit each.
@@ -606,67 +513,9 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The nearest point of the surface and the side of a point, in the tree's units; `near` are points that may be near it.
-fn corner(surface: &Surface, p: DVec3, near: &[Corner], side: Option<Side>) -> Corner {
-    let tree = surface.tree();
-    let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
-    let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
-    let start = Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) };
-    let nearest = tree.nearest(p, start);
-    found(surface, p, Found { nearest, foot: tree.facet(nearest.triangle).nearest(p).point }, side)
-}
-
-/// The point whose nearest triangle was found.
-fn found(surface: &Surface, p: DVec3, Found { nearest, foot }: Found, side: Option<Side>) -> Corner {
-    let tree = surface.tree();
-    let side = side.unwrap_or_else(|| surface.side(p, &tree.facet(nearest.triangle).nearest(p), nearest.triangle));
-    Corner {
-        value: side.sign() * nearest.distance_squared.sqrt(),
-        certain: side.is_certain(),
-        point: p,
-        foot,
-        near: tree.slots[nearest.triangle as usize],
-    }
-}
-
 /// A number for each lattice point.
 fn key(place: [i64; 3]) -> u64 {
     place.iter().fold(0, |key, &i| key << 21 | i as u64)
-}
-
-/// The one side of a cell that the surface does not touch, where the side changes at the surface only.
-fn one_side(corners: &[Corner; 8]) -> Option<Side> {
-    corners.iter().find(|corner| corner.certain).map(|corner| side_of(corner.value))
-}
-
-/// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
-/// no room between them for the surface at which alone it changes.
-fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner]) -> Option<Side> {
-    let apart = ASKED * (surface.tree().radius + p.abs().max_element());
-    let carries = |corner: &&Corner| {
-        let reach = distance + corner.value.abs();
-        corner.certain && corner.value.abs() > apart && (corner.point - p).length_squared() * (1.0 + 1e-9) < reach * reach
-    };
-    if distance > apart { near.iter().find(carries).map(|corner| side_of(corner.value)) } else { None }
-}
-
-/// The side of a distance that is certain.
-fn side_of(value: f64) -> Side {
-    if value < 0.0 { Side::Inside } else { Side::Outside }
-}
-
-/// The one side of a ball that the surface does not touch, if that is certain.
-fn side_of_ball(surface: &Surface, center: &Corner, radius: f64) -> Option<Side> {
-    let triangle = surface.tree().triangle(center.near);
-    surface.side_of_ball(center.point, &surface.tree().facet(triangle).nearest(center.point), triangle, radius)
-}
-
-fn list_side(side: Option<Side>) -> ListSide {
-    match side {
-        Some(Side::Inside) => ListSide::Inside,
-        Some(Side::Outside) => ListSide::Outside,
-        _ => ListSide::Asked,
-    }
 }
 
 /// The index along each axis of a place on the curve that visits siblings in their order.

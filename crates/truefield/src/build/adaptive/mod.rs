@@ -4,7 +4,9 @@
 //! level are independent. The paper compares 19 points of a cell; here a cell is also proven, between its samples too
 //! (`verify`), whichever rule divides it.
 
+mod cell;
 mod coalesce;
+mod corner;
 mod facets;
 mod halves;
 mod mesh;

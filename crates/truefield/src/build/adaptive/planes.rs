@@ -8,7 +8,8 @@
 //! distance is at most h / 2 times the sum of the s off. Instead of s along p and q: across m, d is within sin a of 0, and both
 //! make up 2^(1/2) sin a.
 
-use super::facets::{Corner, affine, ends};
+use super::corner::Corner;
+use super::facets::{affine, ends};
 use crate::bvh::tree::Slot;
 use crate::geom::{DVec3, Interval};
 use crate::simd::{Fuse, multiversion};

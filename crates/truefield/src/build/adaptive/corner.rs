@@ -1,0 +1,83 @@
+//! Corners of cells: their nearest points and their sides.
+
+use crate::bvh::Candidate;
+use crate::bvh::feet::Found;
+use crate::bvh::tree::Slot;
+use crate::field::adaptive::ListSide;
+use crate::geom::DVec3;
+use crate::source::mesh::{Side, Surface};
+
+/// Nearer to the surface than this part of its size every point's side is asked by itself.
+const ASKED: f64 = 1e-6;
+
+/// A lattice point, in the tree's units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Corner {
+    /// Signed distance.
+    pub value: f64,
+    /// Whether its sign is.
+    pub certain: bool,
+    pub point: DVec3,
+    /// The nearest point of the surface.
+    pub foot: DVec3,
+    /// Its triangle.
+    pub near: Slot,
+}
+
+/// The nearest point of the surface and the side of a point, in the tree's units; `near` are points that may be near it.
+pub(super) fn corner(surface: &Surface, p: DVec3, near: &[Corner], side: Option<Side>) -> Corner {
+    let tree = surface.tree();
+    let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
+    let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
+    let start = Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) };
+    let nearest = tree.nearest(p, start);
+    found(surface, p, Found { nearest, foot: tree.facet(nearest.triangle).nearest(p).point }, side)
+}
+
+/// The point whose nearest triangle was found.
+pub(super) fn found(surface: &Surface, p: DVec3, Found { nearest, foot }: Found, side: Option<Side>) -> Corner {
+    let tree = surface.tree();
+    let side = side.unwrap_or_else(|| surface.side(p, &tree.facet(nearest.triangle).nearest(p), nearest.triangle));
+    Corner {
+        value: side.sign() * nearest.distance_squared.sqrt(),
+        certain: side.is_certain(),
+        point: p,
+        foot,
+        near: tree.slots[nearest.triangle as usize],
+    }
+}
+
+/// The one side of a cell that the surface does not touch, where the side changes at the surface only.
+pub(super) fn one_side(corners: &[Corner; 8]) -> Option<Side> {
+    corners.iter().find(|corner| corner.certain).map(|corner| side_of(corner.value))
+}
+
+/// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
+/// no room between them for the surface at which alone it changes.
+pub(super) fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner]) -> Option<Side> {
+    let apart = ASKED * (surface.tree().radius + p.abs().max_element());
+    let carries = |corner: &&Corner| {
+        let reach = distance + corner.value.abs();
+        corner.certain && corner.value.abs() > apart && (corner.point - p).length_squared() * (1.0 + 1e-9) < reach * reach
+    };
+    if distance > apart { near.iter().find(carries).map(|corner| side_of(corner.value)) } else { None }
+}
+
+/// The side of a distance that is certain.
+pub(super) fn side_of(value: f64) -> Side {
+    if value < 0.0 { Side::Inside } else { Side::Outside }
+}
+
+/// The one side of a ball that the surface does not touch, if that is certain.
+pub(super) fn side_of_ball(surface: &Surface, center: &Corner, radius: f64) -> Option<Side> {
+    let triangle = surface.tree().triangle(center.near);
+    surface.side_of_ball(center.point, &surface.tree().facet(triangle).nearest(center.point), triangle, radius)
+}
+
+pub(super) fn list_side(side: Option<Side>) -> ListSide {
+    match side {
+        Some(Side::Inside) => ListSide::Inside,
+        Some(Side::Outside) => ListSide::Outside,
+        _ => ListSide::Asked,
+    }
+}
