@@ -276,6 +276,41 @@ fn touching_zero_is_no_surface() {
     }
 }
 
+/// Zeros that fill a room between both signs: the surface is somewhere in it, and no two bounds contradict each other.
+#[test]
+fn rooms_of_zeros_hide_no_surface() {
+    let [x, y, _] = axes();
+    let least = |a: Expression, b: Expression| a.binary(Binary::Minimum, &b);
+    let most = |a: Expression, b: Expression| a.binary(Binary::Maximum, &b);
+    let nothing = || x.clone() * 0.0;
+    let formulas: [(Expression, fn(DVec3) -> f64); 5] = [
+        ((x.clone() - 0.3).unary(Unary::Floor), |p| (p.x - 0.3).floor()),
+        (most(ball(), nothing()) + least(ball() + 0.2, nothing()), |p| {
+            (p.length_squared() - 1.0).max(0.0) + (p.length_squared() - 0.8).min(0.0)
+        }),
+        (least(x.clone(), nothing()) + most(x.clone() - 1.0, nothing()), |p| p.x.min(0.0) + (p.x - 1.0).max(0.0)),
+        (least(ball(), nothing()), |p| (p.length_squared() - 1.0).min(0.0)),
+        // A room of zeros next to the middle of a face only.
+        (least(x.clone(), nothing()) * (square(&y) + 1.0) + most(x.clone() + square(&y) - 0.04, nothing()), |p| {
+            p.x.min(0.0) * (p.y * p.y + 1.0) + (p.x + p.y * p.y - 0.04).max(0.0)
+        }),
+    ];
+    let (mut random, domain) = (Random::new(23), cube(2.0));
+    for (number, (formula, value)) in formulas.iter().enumerate() {
+        let shape = shape(formula, domain);
+        let places: Vec<DVec3> = points(&mut random, &cube(1.9), 60);
+        let values: Vec<f64> = places.iter().map(|&p| value(p)).collect();
+        let bounds: Vec<Interval> = places.iter().map(|&p| shape.at(p)).collect();
+        for (i, a) in bounds.iter().enumerate() {
+            assert!(!(values[i] < 0.0 && a.lower > 0.0 || values[i] > 0.0 && a.upper < 0.0), "{number}: {a:?} at {}", places[i]);
+            for (j, b) in bounds.iter().enumerate() {
+                let apart = (places[i] - places[j]).length() + 1e-9;
+                assert!(b.lower - a.upper <= apart, "{number}: {a:?} at {} and {b:?} at {}", places[i], places[j]);
+            }
+        }
+    }
+}
+
 #[test]
 fn what_is_no_shape_is_refused() {
     let run = Run::with_threads(1);

@@ -1,6 +1,6 @@
 //! The hierarchy of boxes that may hold surface.
 
-use super::sheet::{Content, Sheet, Side};
+use super::sheet::{Content, Sheet, Side, is_level};
 use super::tape::Tape;
 use super::taylor::Taylor;
 use crate::error::{Error, Result};
@@ -155,7 +155,7 @@ impl Boxes {
 
     /// Refuses a domain without an inside.
     pub(super) fn checked(self, tape: &Tape, domain: &Aabb) -> Result<Self> {
-        if self.nodes.is_empty() && self.solid == Aabb::EMPTY {
+        if self.nodes.is_empty() && self.solid == Aabb::EMPTY || tape.over(domain).lower >= 0.0 {
             let middle = tape.value(domain.center());
             let how = if tape.over(domain).lower > 0.0 { "positive in all of" } else { "nowhere negative in" };
             return Err(Error::invalid(format!(
@@ -218,6 +218,8 @@ fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
     let touched = || Side::around(tape, domain, cell, MARGIN * cell.size().min_element());
     match Content::of(tape, cell) {
         Content::Nothing(side) => Fate::Gone(side),
+        // Where zeros fill a room, surface may be anywhere in it.
+        Content::Open if is_level(tape, cell) => Fate::Leaf(None, f32::INFINITY),
         Content::Open if let Some(side) = touched() => Fate::Gone(side),
         Content::Sheet(sheet) => {
             let known = if sound(&sheet.1, domain) { 0.0 } else { crossed(tape, domain, &sheet.1.extent) };

@@ -13,6 +13,9 @@ const STEADY: f64 = 0.25;
 /// How far around a point its side is looked for, in sizes of the domain.
 const TOUCH: f64 = 1e-9;
 
+/// From a corner, in margins: in no direction in which formulas tend to be zero.
+const ASIDE: DVec3 = DVec3::new(0.31, -0.67, 0.83);
+
 /// What derivatives say of the surface in a box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sheet {
@@ -57,7 +60,7 @@ impl Side {
 
     /// The side of a point of `domain`, where it is certain.
     ///
-    /// Where the formula is 0 and nowhere around it of the other sign, it only touches zero: that is no surface.
+    /// Where the formula is 0 and of one sign around it, it only touches zero: that is no surface.
     pub(super) fn at(tape: &Tape, domain: &Aabb, p: DVec3) -> Option<Self> {
         let value = tape.certain(p);
         Self::of(value).or_else(|| {
@@ -67,16 +70,21 @@ impl Side {
     }
 
     /// The side of all of a box, where the formula nowhere in it, nor within `margin` of it, has the other sign.
+    ///
+    /// Zeros may fill a room that parts both signs: there surface is. Boxes of either sign that touch would share a room of
+    /// zeros at a corner of the smaller one, so that places next to all corners must tell the sign.
     pub(super) fn around(tape: &Tape, domain: &Aabb, cell: &Aabb, margin: f64) -> Option<Self> {
-        let grown = cell.grow(margin);
-        let value = tape.over(&Aabb::new(grown.min.max(domain.min), grown.max.min(domain.max)));
-        if value.lower >= 0.0 {
-            Some(Self::Outside)
-        } else if value.upper <= 0.0 {
-            Some(Self::Inside)
-        } else {
-            None
-        }
+        let side = match over_grown(tape, domain, cell, margin) {
+            Interval { lower, .. } if lower >= 0.0 => Self::Outside,
+            Interval { upper, .. } if upper <= 0.0 => Self::Inside,
+            _ => return None,
+        };
+        let tells = |corner: u8| {
+            let at = DVec3::from([0, 1, 2].map(|axis| if corner >> axis & 1 == 0 { cell.min[axis] } else { cell.max[axis] }));
+            let place = (at + ASIDE * margin).max(domain.min).min(domain.max);
+            Self::of(tape.certain(place)) == Some(side)
+        };
+        (0..8).all(tells).then_some(side)
     }
 
     /// The other one.
@@ -94,6 +102,18 @@ impl Side {
             Self::Outside => 1.0,
         }
     }
+}
+
+/// The formula in a box and within `margin` of it.
+fn over_grown(tape: &Tape, domain: &Aabb, cell: &Aabb, margin: f64) -> Interval {
+    let grown = cell.grow(margin);
+    tape.over(&Aabb::new(grown.min.max(domain.min), grown.max.min(domain.max)))
+}
+
+/// Whether the formula is 0 everywhere in a box.
+pub(super) fn is_level(tape: &Tape, cell: &Aabb) -> bool {
+    let value = tape.over(cell);
+    value.lower == 0.0 && value.upper == 0.0
 }
 
 impl Content {
