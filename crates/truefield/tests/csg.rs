@@ -11,7 +11,8 @@ use truefield::source::csg::{
     Blend, BlendKind, Capsule, Complement, Cuboid, Ellipsoid, Frustum, HalfSpace, Molecule, Offset, Placed, Placement, Sphere, Sponge,
     Torus, Union, difference, intersection, shell, sweep, tube,
 };
-use truefield::{Aabb, DVec3, Distance, Interval, Source};
+use truefield::source::implicit::{Expression, Implicit, Unary};
+use truefield::{Aabb, DVec3, Distance, Interval, Run, Source};
 
 type Shape = Arc<dyn Source>;
 
@@ -610,5 +611,29 @@ fn what_is_no_shape_is_refused() {
     for (i, sentence) in sentences.into_iter().enumerate() {
         let sentence = sentence.unwrap_or_else(|| panic!("number {i} was taken")).to_string();
         assert!(sentence.len() > 20, "{i}: {sentence}");
+    }
+}
+
+/// Many points together are answered where each alone is, though the formula is no number in their middle.
+#[test]
+fn the_middle_of_points_need_not_have_an_answer() {
+    let [x, y, z] = Expression::axes();
+    let square = |e: &Expression| e.unary(Unary::Square);
+    let radius = square(&x) + square(&y) + square(&z);
+    let formula = radius.clone() - 0.25 + radius.unary(Unary::Logarithm) * 0.0;
+    let domain = Aabb::new(DVec3::splat(-1.0), DVec3::ONE);
+    let holed = Implicit::new(&formula, domain, &Run::with_threads(1)).expect("a shape");
+    let ball = Sphere::new(DVec3::X * 3.0, 0.3).expect("a ball");
+    let union = Union::new(vec![Arc::new(holed), Arc::new(ball)]).expect("a union");
+    for count in [2, 4, 16, 20, 40] {
+        let places: Vec<DVec3> =
+            (0..count / 2).flat_map(|n| [1.0, -1.0].map(|s| DVec3::new(0.1, 0.2, 0.3 + 0.01 * f64::from(n)) * s)).collect();
+        let mut together = vec![0.0; places.len()];
+        union.values(&places, &mut together).expect("values");
+        for (p, together) in places.iter().zip(together) {
+            let mut alone = [0.0];
+            union.values(&[*p], &mut alone).expect("a value");
+            assert_eq!(alone[0].to_bits(), together.to_bits(), "{p}");
+        }
     }
 }

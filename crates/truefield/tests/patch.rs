@@ -2,8 +2,11 @@
 
 mod residual;
 
+use std::sync::Arc;
+
 use residual::residuals;
 use truefield::laws::{Random, check_lipschitz, check_threads};
+use truefield::source::csg::{Sphere, Union};
 use truefield::source::patch::{Bezier, Patches, Sides};
 use truefield::{Aabb, DVec3, Distance, Run, Source};
 
@@ -11,9 +14,9 @@ fn patches(set: &[Bezier], sides: Sides) -> Patches {
     Patches::new(set, sides, &Run::with_threads(2)).expect("patches")
 }
 
-fn value(patches: &Patches, p: DVec3) -> f64 {
+fn value(shape: &dyn Source, p: DVec3) -> f64 {
     let mut out = [0.0];
-    patches.values(&[p], &mut out).expect("a value");
+    shape.values(&[p], &mut out).expect("a value");
     out[0]
 }
 
@@ -344,14 +347,37 @@ fn sides_hold_next_to_the_surface_and_slopes_lead_away_from_it() {
     assert!(certain > 1100, "{certain}");
 }
 
+/// Unions ask some parts about many points at once.
 #[test]
 fn a_point_s_value_does_not_depend_on_its_neighbours() {
-    let shape = patches(&ball(), Sides::Closed);
+    let parts: Vec<Arc<dyn Source>> = vec![
+        Arc::new(patches(&ball(), Sides::Closed)),
+        Arc::new(Sphere::new(DVec3::new(1.2, 0.3, 0.1), 0.7).expect("a ball")),
+        Arc::new(Sphere::new(DVec3::new(-4.0, 0.3, 0.1), 0.7).expect("a ball")),
+    ];
+    let shape = Union::new(parts).expect("a union");
     let mut random = Random::new(13);
     let places: Vec<DVec3> = (0..200).map(|_| random.direction() * random.length(0.1, 3.0)).collect();
     let mut together = vec![0.0; places.len()];
     shape.values(&places, &mut together).expect("values");
     for (&p, together) in places.iter().zip(together) {
         assert_eq!(value(&shape, p).to_bits(), together.to_bits(), "{p}");
+    }
+}
+
+#[test]
+fn sizes_whose_powers_are_no_numbers_are_refused() {
+    for (scale, fits) in [(1e-200, false), (1e-53, false), (1e-38, true), (1e38, true), (1e60, false), (1e200, false)] {
+        let set: Vec<Bezier> = ball().iter().map(|patch| Bezier(patch.0.map(|row| row.map(|p| p * scale)))).collect();
+        for sides in [Sides::Closed, Sides::Unsigned] {
+            match Patches::new(&set, sides, &Run::with_threads(1)) {
+                Ok(shape) => {
+                    let at = shape.at(DVec3::new(0.4, 0.5, 2.6) * scale);
+                    let near = (at.lower / scale, at.upper / scale);
+                    assert!(fits && near.0 > 1.5 && near.1 < 1.8, "{scale}: {near:?}");
+                }
+                Err(refusal) => assert!(!fits && refusal.to_string().contains("unit"), "{scale}: {refusal}"),
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use truefield::laws::Random;
-use truefield::source::csg::{Blend, BlendKind, Complement, Offset, Placed, Placement, Sphere, Union};
+use truefield::source::csg::{Blend, BlendKind, Capsule, Complement, Frustum, Offset, Placed, Placement, Sphere, Union, sweep};
 use truefield::source::implicit::{Expression, Implicit, Unary};
 use truefield::{Aabb, DVec3, Distance, Interval, Result, Run, Source};
 
@@ -172,4 +172,30 @@ fn blends_of_formulas_stay_above_what_is_said() {
         told += usize::from(holds("blend", &blend, &Aabb::new(center - half, center + half), &mut random));
     }
     assert!(told > 10, "{told} of 150 boxes are told a slope");
+}
+
+/// Beside a long straight way slopes have no part along it, but for what is left of looking for the nearest place on it.
+#[test]
+fn strokes_say_how_good_their_slopes_are() {
+    let end = DVec3::new(100.0, 30.0, 10.0);
+    let along = end.normalize();
+    let tools: [Arc<dyn Source>; 3] = [
+        Arc::new(Capsule::new(DVec3::ZERO, DVec3::new(0.3, 0.2, 0.7), 0.4).expect("a capsule")),
+        Arc::new(Frustum::cylinder(0.5, 1.0).expect("a cylinder")),
+        Arc::new(Sphere::new(DVec3::ZERO, 0.5).expect("a ball")),
+    ];
+    let mut random = Random::new(31);
+    let mut told = 0;
+    for tool in &tools {
+        let poses = [DVec3::ZERO, end].map(|at| Placement::translate(at).expect("a place"));
+        let swept = sweep(tool, &poses).expect("a sweep");
+        for _ in 0..400 {
+            let p = end * random.between(0.2, 0.8) + random.direction() * random.between(1.5, 8.0);
+            let tilt = swept.tilt(p);
+            let off = slope(&swept, p).dot(along).abs();
+            assert!(off <= tilt, "{p}: {off} along the way, {tilt} said");
+            told += usize::from(tilt < 1e-2);
+        }
+    }
+    assert!(told > 1000, "{told}");
 }

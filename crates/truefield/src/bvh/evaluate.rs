@@ -26,7 +26,7 @@ pub(crate) struct Points {
     pub x: [f64; BLOCK],
     pub y: [f64; BLOCK],
     pub z: [f64; BLOCK],
-    /// How many differ; the others repeat them.
+    /// No fewer than differ; the others repeat them.
     pub count: usize,
 }
 

@@ -239,8 +239,18 @@ impl Source for Stroke {
         Ok(())
     }
 
+    /// A tool that does not turn leaves a convex function, which stays above its tangent. A slope at a place on the way where
+    /// the tool's value is `left` too large, and bends by no more than b, is off by left / h + b h / 2 for every h.
     fn tilt(&self, p: DVec3) -> f64 {
-        self.least(p).map_or(f64::INFINITY, |probe| self.tool.tilt(self.pose(probe.share).inward(p)))
+        let left = 2.0 * self.fine + self.open;
+        let reach = (left * self.extent.diagonal()).sqrt();
+        match self.least(p) {
+            Ok(probe) if self.turning.angle == 0.0 && reach > 0.0 => {
+                let bend = self.bend(&Aabb::new(p, p).grow(reach)).upper.max(0.0);
+                self.tool.tilt(self.pose(probe.share).inward(p)) + left / reach + 0.5 * bend * reach
+            }
+            _ => f64::INFINITY,
+        }
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {

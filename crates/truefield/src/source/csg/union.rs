@@ -123,7 +123,8 @@ impl Union {
             let together = if self.parts.len() <= FEW && points.len() < SHARED {
                 Some((0..self.parts.len()).collect())
             } else if points.len() > 1 {
-                let found = self.candidates(&Aabb::around(points.iter().copied()), TOGETHER)?;
+                // Where the middle cannot be asked, nothing is said of the points themselves.
+                let found = self.candidates(&Aabb::around(points.iter().copied()), TOGETHER).unwrap_or_default();
                 found.map(|found| found.iter().map(|candidate| candidate.part).collect::<Vec<_>>())
             } else {
                 None

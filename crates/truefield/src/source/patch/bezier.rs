@@ -83,8 +83,8 @@ impl Bezier {
         [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)].map(|(du, dv)| {
             let (rows, columns) = (4 - du, 4 - dv);
             let points = (0..rows * columns).map(|k| along(k / columns, k % columns, du, dv));
-            // Halving and differences round.
-            Aabb::around(points).grow(64.0 * f64::EPSILON * size)
+            // Differences round, and take each of some twenty halvings' rounding times 24.
+            Aabb::around(points).grow(1024.0 * f64::EPSILON * size)
         })
     }
 }

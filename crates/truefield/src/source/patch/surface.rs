@@ -17,6 +17,10 @@ const FINER: u32 = 4;
 /// Where the way to the nearest point is no more than this many times the accuracy, its direction is not relied on.
 const TOUCHING: f64 = 1e5;
 
+/// Sizes whose sixth powers are numbers, as proofs need.
+const SMALLEST: f64 = 1e-40;
+const LARGEST: f64 = 1e40;
+
 /// What decides sides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sides {
@@ -43,7 +47,7 @@ pub struct Patches {
 }
 
 impl Patches {
-    /// Fails where there are no patches, control points are not finite, or sides are wanted and the patches do not close up.
+    /// Fails where there are no patches, control points are not finite or beyond 1e40, patches smaller than 1e-40, or sides are wanted and the patches do not close up.
     pub fn new(patches: &[Bezier], sides: Sides, run: &Run<'_>) -> Result<Self> {
         if patches.is_empty() {
             return Err(Error::invalid("there are no patches; give an array of shape (n, 4, 4, 3)"));
@@ -52,6 +56,11 @@ impl Patches {
             return Err(Error::invalid(format!("patch {index} has control points that are not finite numbers")));
         }
         let tree = Tree::new(patches);
+        let across = tree.extent.size().max_element();
+        if across > 0.0 && across < SMALLEST || !(tree.size <= LARGEST) {
+            let size = across.max(tree.size);
+            return Err(Error::invalid(format!("the patches are {size:.1e} large; give them in a unit of about their size")));
+        }
         let accuracy = 1e-11 * (tree.extent.diagonal() + tree.size);
         let sides = match sides {
             Sides::Unsigned => None,

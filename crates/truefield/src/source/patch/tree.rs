@@ -13,6 +13,9 @@ pub(super) const WIDTH: usize = 8;
 /// How often a patch is divided, into eight each time, at most.
 const LEVELS: u32 = 4;
 
+/// Parts, about half a kilobyte each, that all patches may have together; searches divide further what needs it.
+const MOST: usize = 1 << 18;
+
 /// As often it is always divided, unless it is nearly flat.
 const USUAL: u32 = 2;
 
@@ -69,12 +72,14 @@ pub(super) struct Tree {
 impl Tree {
     pub fn new(patches: &[Bezier]) -> Self {
         let nets = patches.iter().map(Net::new).collect();
+        let fits = |level: &u32| patches.len() << (3 * level) <= MOST;
+        let levels = (USUAL..=LEVELS).rev().find(fits).unwrap_or(USUAL);
         let mut tree =
             Self { nets, patches: patches.to_vec(), nodes: Vec::new(), parts: Vec::new(), root: 0, extent: Aabb::EMPTY, size: 0.0 };
         let roots: Vec<(Aabb, u32)> = (0..patches.len())
             .map(|patch| {
                 let piece = Piece::new(patches[patch]);
-                tree.grow(&Half { patch: patch as u32, piece, low: [0.0; 2], size: [1.0; 2] }, 0)
+                tree.grow(&Half { patch: patch as u32, piece, low: [0.0; 2], size: [1.0; 2] }, 0, levels)
             })
             .collect();
         tree.extent = around(&roots);
@@ -112,17 +117,17 @@ impl Tree {
     }
 
     /// Adds a part of a patch and its own parts; a box around it, and what it is called among children.
-    fn grow(&mut self, half: &Half, level: u32) -> (Aabb, u32) {
+    fn grow(&mut self, half: &Half, level: u32, levels: u32) -> (Aabb, u32) {
         let part = self.part(half);
         let known = part.bends.determinant() / part.middle.u.cross(part.middle.v).length_squared();
         let (number, mut extent) = (self.parts.len(), *half.piece.extent());
         self.parts.push(part);
-        if level < LEVELS && !(known > FLAT) && (level < USUAL || known <= KNOWN) {
+        if level < levels && !(known > FLAT) && (level < USUAL || known <= KNOWN) {
             let mut parts = vec![half.clone()];
             while parts.len() < WIDTH {
                 parts = parts.iter().flat_map(Half::halves).collect();
             }
-            let children: Vec<_> = parts.iter().map(|part| self.grow(part, level + 1)).collect();
+            let children: Vec<_> = parts.iter().map(|part| self.grow(part, level + 1, levels)).collect();
             extent = around(&children);
             self.parts[number].node = self.node(children);
         }
