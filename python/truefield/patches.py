@@ -36,14 +36,14 @@ def surface(
         threads: number of threads; all cores by default.
         progress: called as `progress(phase, fraction)`.
 
-    A distance to the teapot's parts takes one to three microseconds on one core, to patches that bend at random ten times as
-    much. Points as far from a large part of the surface as from its nearest point, like the middle of a ball, take
-    longer and have wider bounds.
+    A distance to the teapot's parts takes one to three microseconds on one core, to patches that bend at random ten
+    times as much. Points as far from a large part of the surface as from its nearest point, like the middle of a ball,
+    take longer and have wider bounds.
 
     Raises:
-        TruefieldError: the array has another shape, numbers that are not finite or of no unit near the patches' size (smaller than
-            1e-40, larger than 1e40), or the patches do not close up;
-            when asked, the side of a point next to the surface cannot be decided.
+        TruefieldError: the array has another shape, numbers that are not finite, patches smaller than 1e-40 or larger
+            than 1e40, or the patches do not close up; when asked, the side of a point next to the surface cannot be
+            decided.
     """
     try:
         array = np.ascontiguousarray(control_points, dtype=np.float64)

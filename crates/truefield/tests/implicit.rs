@@ -276,6 +276,8 @@ fn touching_zero_is_no_surface() {
     }
 }
 
+type Value = fn(DVec3) -> f64;
+
 /// Zeros that fill a room between both signs: the surface is somewhere in it, and no two bounds contradict each other.
 #[test]
 fn rooms_of_zeros_hide_no_surface() {
@@ -283,7 +285,7 @@ fn rooms_of_zeros_hide_no_surface() {
     let least = |a: Expression, b: Expression| a.binary(Binary::Minimum, &b);
     let most = |a: Expression, b: Expression| a.binary(Binary::Maximum, &b);
     let nothing = || x.clone() * 0.0;
-    let formulas: [(Expression, fn(DVec3) -> f64); 5] = [
+    let formulas: [(Expression, Value); 5] = [
         ((x.clone() - 0.3).unary(Unary::Floor), |p| (p.x - 0.3).floor()),
         (most(ball(), nothing()) + least(ball() + 0.2, nothing()), |p| {
             (p.length_squared() - 1.0).max(0.0) + (p.length_squared() - 0.8).min(0.0)
