@@ -50,7 +50,7 @@ impl Feet {
         let Self { pairs, groups, found } = self;
         let count = pairs.len().div_ceil(WIDTH);
         if groups.len() < count {
-            groups.resize(count, NOTHING);
+            groups.resize(count, Packet::EMPTY);
         }
         // All that is stored here has long been written when it is read.
         for (group, packet) in pairs.chunks(WIDTH).zip(groups.iter_mut()) {
@@ -83,32 +83,10 @@ impl Feet {
     }
 }
 
-/// A group whose lanes are still to be filled.
-const NOTHING: Packet = Packet {
-    a: [[0.0; WIDTH]; 3],
-    ab: [[0.0; WIDTH]; 3],
-    ac: [[0.0; WIDTH]; 3],
-    v: [[0.0; WIDTH]; 3],
-    inverse: [[0.0; WIDTH]; 3],
-    slope: [0.0; WIDTH],
-    triangle: [0; WIDTH],
-    first: 0,
-    count: 0,
-};
-
 /// The triangles of a group in lanes; those beyond it are anything.
 #[inline(always)]
 fn gather(tree: &Tree, group: &[(Slot, u32)], packet: &mut Packet) {
     for (lane, &(slot, _)) in group.iter().enumerate() {
-        let facet = tree.facet_at(slot);
-        for axis in 0..3 {
-            packet.a[axis][lane] = facet.a[axis];
-            packet.ab[axis][lane] = facet.ab[axis];
-            packet.ac[axis][lane] = facet.ac[axis];
-            packet.v[axis][lane] = facet.v[axis];
-            packet.inverse[axis][lane] = facet.inverse[axis];
-        }
-        packet.slope[lane] = facet.slope;
-        packet.triangle[lane] = tree.triangle(slot);
+        packet.set(lane, tree.facet_at(slot), tree.triangle(slot));
     }
 }
