@@ -79,7 +79,7 @@ impl Surface {
 
     /// Sides, in the tree's units.
     pub(crate) fn side(&self, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
-        self.signs.side(&self.work, p, nearest, triangle)
+        self.signs.side(self.tree.facet(triangle), p, nearest, triangle)
     }
 
     /// Whether `p`, in the tree's units, is certainly outside by its place alone.
@@ -89,12 +89,12 @@ impl Surface {
 
     /// The one side of a ball that does not touch the surface, in the tree's units.
     pub(crate) fn side_of_ball(&self, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> Option<Side> {
-        self.signs.side_of_ball(&self.work, p, nearest, triangle, radius)
+        self.signs.side_of_ball(self.tree.facet(triangle), p, nearest, triangle, radius)
     }
 
     /// The side of `p` and how far it carries off the surface, in the tree's units: see `Signs::steady`.
     pub(crate) fn steady(&self, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> (Side, f64) {
-        self.signs.steady(&self.work, p, nearest, triangle, radius)
+        self.signs.steady(self.tree.facet(triangle), p, nearest, triangle, radius)
     }
 
     /// See `Signs::whole`, in the tree's units.

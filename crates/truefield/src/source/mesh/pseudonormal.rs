@@ -10,16 +10,28 @@
 //! the rounding. If the surface within s of q is nothing but the triangles that meet at q, the directions with
 //! cosines above g = d / s + s / (2 r) still lead to p's side, and the others add at most
 //! 2 pi g^2. So |N . e| > 2 pi g^2 proves the side; anything else is left to the winding number.
+//!
+//! The best s is the root of 2 r d. Where r > 8 d and there is room for s >= 4 d, both parts of g are at most 1/4 for that or
+//! the largest s below it, so that |N . e| > pi / 2 is enough: that is asked first, without another root.
 
 use std::f64::consts::{PI, TAU};
 
 use crate::bvh::intersect::{Clearance, Meetings};
-use crate::geom::{DVec3, FacetPoint, Feature};
+use crate::geom::{DVec3, Facet, FacetPoint, Feature};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::{Topology, collapsed};
 
 /// Half an ulp of 1.
 const UNIT: f64 = f64::EPSILON / 2.0;
+
+/// So many times the rounding is room enough, with some to spare.
+const CLEAR: f64 = 8.0 * (1.0 + 1e-9);
+
+/// No more than this comes from directions outside the cone, as the module's text says.
+const QUARTER: f64 = TAU / 4.0 * (1.0 + 1e-9);
+
+/// Squared sides over the squared area up to which the rounding of a face's normal does not count.
+const SHARP: f64 = 1e16;
 
 /// A sum of unit normals weighted by angles, and the rounding in it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,7 +74,7 @@ pub(crate) struct Pseudonormals {
 impl Pseudonormals {
     /// For any mesh; nothing is proven.
     pub fn new(mesh: &TriangleMesh, topology: &Topology) -> Self {
-        let faces: Vec<Pseudonormal> = (0..topology.triangles.len() as u32).map(|t| face(&mesh.corners(t))).collect();
+        let faces: Vec<Pseudonormal> = (0..topology.triangles.len() as u32).map(|t| face(&mesh.facet(t))).collect();
         let mut corners = vec![Pseudonormal::default(); mesh.vertices().len()];
         for (t, (welded, &normal)) in topology.triangles.iter().zip(&faces).enumerate() {
             let at = mesh.corners(t as u32);
@@ -137,9 +149,9 @@ impl Pseudonormals {
         edges && corners && self.room.get(t).is_some_and(|room| room[0] > 0.0)
     }
 
-    /// The side of `p`, whose nearest point is `nearest` on `triangle`: positive outside, negative inside;
-    /// `None` where rounding may have turned it.
-    pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<f64> {
+    /// The side of `p`, whose nearest point is `nearest` on `triangle`, prepared as `facet`: positive outside, negative
+    /// inside; `None` where rounding may have turned it.
+    pub fn side(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<f64> {
         let away = p - nearest.point;
         let distance = away.length();
         let off = self.rounding.max(64.0 * UNIT * p.abs().max_element());
@@ -147,19 +159,36 @@ impl Pseudonormals {
             return None;
         }
         let t = triangle as usize;
+        let room = self.room.get(t);
+        let clear = room.is_none_or(|&[gap, slope]| {
+            let (gap, slope) = (f64::from(gap), f64::from(slope));
+            // Half the room is kept to, and four times the rounding has to fit in.
+            gap > CLEAR * off && beyond_edges(facet, nearest, slope, (CLEAR + slope) * off)
+        });
         let normal = match nearest.feature {
             Feature::Face => {
+                let across = facet.ab.cross(facet.ac);
+                let height = across.dot(away);
+                let (length, sides) = (across.length(), facet.ab.length_squared() * facet.ac.length_squared());
+                if clear && height.abs() > 0.5 * length * distance && sides < SHARP * (length * length) {
+                    return Some(height);
+                }
                 let mut normal = Pseudonormal::default();
-                normal.add(face(&mesh.corners(triangle)), TAU);
+                normal.add(face(facet), TAU);
                 normal
             }
             Feature::Edge(k) => *self.edges.get(self.edge_of[t][usize::from(k)] as usize)?,
             Feature::Vertex(k) => self.corners[self.corner_of[t][usize::from(k)] as usize],
         };
-        let unsure = match self.room.get(t) {
+        let height = normal.sum.dot(away);
+        let least = normal.error * distance + normal.sum.length() * off;
+        if clear && height.abs() > QUARTER * distance + least {
+            return Some(height);
+        }
+        let unsure = match room {
             None => 0.0,
             Some(&[gap, slope]) => {
-                let clear = f64::from(gap).min(f64::from(slope) * (reach(&mesh.corners(triangle), nearest) - off)) * 0.5;
+                let clear = f64::from(gap).min(f64::from(slope) * (reach(facet, nearest) - off)) * 0.5;
                 if clear <= 4.0 * off {
                     return None;
                 }
@@ -168,15 +197,13 @@ impl Pseudonormals {
                 TAU * cosine * cosine
             }
         };
-        let height = normal.sum.dot(away);
-        (height.abs() > (unsure + normal.error) * distance + normal.sum.length() * off).then_some(height)
+        (height.abs() > unsure * distance + least).then_some(height)
     }
 }
 
 /// The unit normal of a triangle; zero where it has none.
-fn face(corners: &[DVec3; 3]) -> Pseudonormal {
-    let [a, b, c] = *corners;
-    let (ab, ac) = (b - a, c - a);
+fn face(facet: &Facet) -> Pseudonormal {
+    let (ab, ac) = (facet.ab, facet.ac);
     let cross = ab.cross(ac);
     let length = cross.length();
     if length == 0.0 {
@@ -185,22 +212,32 @@ fn face(corners: &[DVec3; 3]) -> Pseudonormal {
     Pseudonormal { sum: cross / length, error: 8.0 * UNIT * ((ab.length_squared() * ac.length_squared()).sqrt() / length + 1.0) }
 }
 
-/// Distance from the nearest point to the edges of its triangle that do not contain its feature.
-fn reach(corners: &[DVec3; 3], nearest: &FacetPoint) -> f64 {
-    let counts = |edge: u8| match nearest.feature {
+/// The edges of a triangle that do not contain the nearest point's feature: the squared area of the parallelogram over each
+/// and the nearest point, and its squared length.
+fn edges_off(facet: &Facet, nearest: &FacetPoint) -> impl Iterator<Item = (f64, f64)> {
+    let (w, [ab, ac]) = (nearest.point - facet.a, [facet.ab, facet.ac]);
+    let edges = [(ab, w), (ac - ab, w - ab), (ac, w)];
+    let feature = nearest.feature;
+    let counts = move |edge: u8| match feature {
         Feature::Face => true,
         Feature::Edge(own) => edge != own,
         Feature::Vertex(own) => edge == (own + 1) % 3,
     };
-    (0..3)
-        .filter(|&edge| counts(edge))
-        .map(|edge| {
-            let (from, to) = (corners[usize::from(edge)], corners[usize::from(edge + 1) % 3]);
-            // One root of the least is quicker than a root for each.
-            (to - from).cross(nearest.point - from).length_squared() / (to - from).length_squared()
-        })
-        .fold(f64::INFINITY, f64::min)
-        .sqrt()
+    (0..3).filter(move |&edge| counts(edge)).map(move |edge| {
+        let (along, from) = edges[usize::from(edge)];
+        (along.cross(from).length_squared(), along.length_squared())
+    })
+}
+
+/// Whether `slope` times the distance to all those edges is above `limit`.
+fn beyond_edges(facet: &Facet, nearest: &FacetPoint, slope: f64, limit: f64) -> bool {
+    edges_off(facet, nearest).all(|(area, length)| slope * slope * area > limit * limit * length)
+}
+
+/// Distance from the nearest point to those edges.
+fn reach(facet: &Facet, nearest: &FacetPoint) -> f64 {
+    // One root of the least is quicker than a root for each.
+    edges_off(facet, nearest).map(|(area, length)| area / length).fold(f64::INFINITY, f64::min).sqrt()
 }
 
 /// How far a nearest point may be off, for points within the box of the mesh.

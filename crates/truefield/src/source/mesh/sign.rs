@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::bvh::Tree;
 use crate::error::Result;
-use crate::geom::{Aabb, DVec3, FacetPoint};
+use crate::geom::{Aabb, DVec3, Facet, FacetPoint};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
@@ -169,13 +169,13 @@ impl Signs {
         &self.rule
     }
 
-    /// The side of `p`, whose nearest point is `nearest` on `triangle`.
-    pub fn side(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
+    /// The side of `p`, whose nearest point is `nearest` on `triangle`, prepared as `facet`.
+    pub fn side(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Side {
         let Some(decided) = &self.decided else { return Side::Outside };
         if self.blurred(nearest) {
-            return decided.guess(mesh, p, triangle);
+            return decided.guess(facet, p, triangle);
         }
-        match decided.near(mesh, p, nearest, triangle) {
+        match decided.near(facet, p, nearest, triangle) {
             Some((side, _)) => side,
             // On the surface there is no side to look for.
             None if nearest.distance_squared == 0.0 => Side::PerhapsOutside,
@@ -184,16 +184,16 @@ impl Signs {
     }
 
     /// The side of every point of the ball around `p`, which does not touch the surface, if they all have one.
-    pub fn side_of_ball(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> Option<Side> {
+    pub fn side_of_ball(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> Option<Side> {
         let Some(decided) = &self.decided else { return Some(Side::Outside) };
         if self.parted {
-            return Some(self.side(mesh, p, nearest, triangle)).filter(|side| side.is_certain());
+            return Some(self.side(facet, p, nearest, triangle)).filter(|side| side.is_certain());
         }
         match decided.walls {
             // Pseudonormals that are not proven may change their mind anywhere.
             Walls::Trusted => None,
             _ if self.blurred(nearest) => None,
-            _ => match decided.near(mesh, p, nearest, triangle) {
+            _ => match decided.near(facet, p, nearest, triangle) {
                 Some((side, carry)) if carry >= radius => Some(side),
                 _ => decided.sum.side_of_ball(p, radius),
             },
@@ -202,17 +202,17 @@ impl Signs {
 
     /// The side of `p`, and the length of the paths from it that stay on that side as long as they stay off the
     /// surface; paths longer than `radius` are not asked for.
-    pub fn steady(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> (Side, f64) {
+    pub fn steady(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32, radius: f64) -> (Side, f64) {
         match &self.decided {
             Some(decided) if !self.parted && !matches!(decided.walls, Walls::Trusted) && !self.blurred(nearest) => {
-                match decided.near(mesh, p, nearest, triangle) {
+                match decided.near(facet, p, nearest, triangle) {
                     Some(known) => known,
                     None if nearest.distance_squared == 0.0 => (Side::PerhapsOutside, 0.0),
                     None => decided.sum.steady(p, radius),
                 }
             }
             _ => {
-                let side = self.side(mesh, p, nearest, triangle);
+                let side = self.side(facet, p, nearest, triangle);
                 (side, if self.parted && side.is_certain() { f64::INFINITY } else { 0.0 })
             }
         }
@@ -280,7 +280,7 @@ fn rule(choice: SignChoice, fault: Option<&str>, joined: Option<&Joined>, closed
 impl Decided {
     /// The side of `p` by its nearest triangle, and the length of paths off the surface that stay on it; `None` where the
     /// triangle cannot tell.
-    fn near(&self, mesh: &TriangleMesh, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<(Side, f64)> {
+    fn near(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<(Side, f64)> {
         if !self.hull.contains(p) {
             return Some((Side::Outside, f64::INFINITY));
         }
@@ -289,7 +289,8 @@ impl Decided {
         if left <= 0.0 {
             return None;
         }
-        let height = self.normals.side(self.joined.as_deref().unwrap_or(mesh), p, nearest, triangle)?;
+        let joined = self.joined.as_ref().map(|mesh| mesh.facet(triangle));
+        let height = self.normals.side(joined.as_ref().unwrap_or(facet), p, nearest, triangle)?;
         Some((wall.side(height), left))
     }
 
@@ -301,9 +302,8 @@ impl Decided {
     }
 
     /// A guess by the plane of the nearest triangle, for points so near that nothing better can be known.
-    fn guess(&self, mesh: &TriangleMesh, p: DVec3, triangle: u32) -> Side {
-        let [a, b, c] = mesh.corners(triangle);
-        match self.wall(triangle).side((b - a).cross(c - a).dot(p - a)) {
+    fn guess(&self, facet: &Facet, p: DVec3, triangle: u32) -> Side {
+        match self.wall(triangle).side(facet.ab.cross(facet.ac).dot(p - facet.a)) {
             Side::Inside | Side::PerhapsInside => Side::PerhapsInside,
             Side::Outside | Side::PerhapsOutside => Side::PerhapsOutside,
         }
@@ -423,7 +423,7 @@ mod tests {
 
         fn side(&self, p: DVec3) -> Side {
             let (foot, triangle) = self.foot(p);
-            self.signs.side(&self.mesh, p, &foot, triangle)
+            self.signs.side(self.tree.facet(triangle), p, &foot, triangle)
         }
 
         /// Near a corner, an edge or a face, as near as rounding allows.
@@ -450,7 +450,7 @@ mod tests {
             for _ in 0..150_000 {
                 let p = asked.near(&mut r);
                 let (foot, triangle) = asked.foot(p);
-                let by_normal = normals.side(&asked.mesh, p, &foot, triangle);
+                let by_normal = normals.side(asked.tree.facet(triangle), p, &foot, triangle);
                 let by_sum = sum.side(p);
                 match by_normal {
                     Some(height) if by_sum.is_certain() => {
@@ -531,7 +531,7 @@ mod tests {
                     continue;
                 }
                 asked_near += 1;
-                let Some((side, carry)) = decided.near(&asked.mesh, p, &foot, triangle) else { continue };
+                let Some((side, carry)) = decided.near(asked.tree.facet(triangle), p, &foot, triangle) else { continue };
                 known += 1;
                 assert!(side.is_certain() && carry > 0.0);
                 let by_sum = sum.side(p);
@@ -566,7 +566,7 @@ mod tests {
                 let p = DVec3::new(r() - 0.5, r() - 0.5, r() - 0.5) * 3.0;
                 let (foot, triangle) = asked.foot(p);
                 let radius = foot.distance_squared.sqrt() * 0.999 * r();
-                let Some(side) = asked.signs.side_of_ball(&asked.mesh, p, &foot, triangle, radius) else {
+                let Some(side) = asked.signs.side_of_ball(asked.tree.facet(triangle), p, &foot, triangle, radius) else {
                     torn += 1;
                     continue;
                 };
