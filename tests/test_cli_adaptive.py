@@ -39,12 +39,30 @@ def test_a_tree_becomes_a_surface_and_a_picture(truefield: Command, folder: Path
         assert image.size == (80, 64)
 
 
+def test_a_surface_is_grown_as_far_as_the_margin(truefield: Command, folder: Path) -> None:
+    part = tf.read(folder / "blob.ply")
+    size = float((part.extent[1] - part.extent[0]).max())
+    truefield.done("adaptive", folder / "blob.ply", "--tolerance", 0.02 * size, "-o", folder / "a.tfield")
+    words = ("surface", folder / "a.tfield", "--offset", 0.4 * size, "-o", folder / "grown.stl")
+    status, _, said = truefield(*words)
+    assert status == 2
+    assert "domain" in said
+    assert not (folder / "grown.stl").exists()
+    more = ("--margin", 0.5 * size)
+    truefield.done("adaptive", folder / "blob.ply", "--tolerance", 0.02 * size, "-o", folder / "a.tfield", *more)
+    truefield.done(*words)
+    grown = tf.read(folder / "grown.stl")
+    away = tf.Surface(part).distance(grown.vertices)
+    assert abs(away - 0.4 * size).max() < 0.06 * size
+
+
 def test_what_cannot_be_done_is_a_sentence(truefield: Command, folder: Path) -> None:
     truefield.done("adaptive", folder / "blob.ply", "--tolerance", 0.05, "-o", folder / "a.tfield")
     (folder / "cut.tfield").write_bytes((folder / "a.tfield").read_bytes()[:3000])
     for words in (
         ("adaptive", folder / "blob.ply", "--tolerance", -1, "-o", folder / "b.tfield"),
         ("adaptive", folder / "blob.ply", "--tolerance", 1, "-o", folder / "b.stl"),
+        ("adaptive", folder / "blob.ply", "--tolerance", 1, "--margin", -1, "-o", folder / "b.tfield"),
         ("adaptive", folder / "none.ply", "--tolerance", 1, "-o", folder / "b.tfield"),
         ("surface", folder / "a.tfield", "--offset", -999, "-o", folder / "b.stl"),
         ("render", folder / "cut.tfield", "-o", folder / "b.png"),

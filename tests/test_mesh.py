@@ -146,3 +146,16 @@ def test_writing_to_an_unknown_suffix_says_which_are_known(tmp_path: Path) -> No
     with pytest.raises(tf.FileError, match=r"\.stl, \.obj, \.ply, \.off"):
         cube().write(tmp_path / "part.step")
     assert not list(tmp_path.iterdir())
+
+
+def test_points_are_taken_as_they_are_or_refused() -> None:
+    surface = tf.Surface(tf.shapes.cube())
+    points = np.random.default_rng(1).uniform(-1.0, 6.0, (20, 3))
+    expected = surface.distance(points)
+    unaligned = np.frombuffer(b"x" + points.tobytes(), np.uint8)[1:].view(np.float64).reshape(-1, 3)
+    for same in (unaligned, points.astype(">f8"), np.asfortranarray(points), points[::-1][::-1], points.tolist()):
+        np.testing.assert_array_equal(surface.distance(same), expected)
+    dates = np.zeros((2, 3), "M8[s]")
+    for wrong in (points + 1j, dates, np.ma.masked_array(points, points > 5.0), "abc", None):
+        with pytest.raises(tf.TruefieldError, match="points"):
+            surface.distance(wrong)  # type: ignore[arg-type]

@@ -104,6 +104,66 @@ def test_no_surface_is_said() -> None:
         field.surface(memory=100)
 
 
+def test_what_would_leave_the_domain_is_refused_and_what_the_domain_cuts_is_not(tmp_path: Path) -> None:
+    field = tf.adaptive_field(csg.sphere(1.0), 0.02)
+    field.save(tmp_path / "a.tfield")
+    loaded = tf.load(tmp_path / "a.tfield")
+    assert isinstance(loaded, tf.AdaptiveField)
+    for one in (field, field.level_of_detail(depth=4), loaded):
+        assert one.surface(0.2).check().watertight
+        # The domain ends 0.25 from the ball.
+        with pytest.raises(tf.TruefieldError, match="domain"):
+            one.surface(0.5)
+        with pytest.raises(tf.TruefieldError, match="domain"):
+            one.render(distance=0.5, size=(64, 64))
+        with pytest.raises(tf.TruefieldError, match="domain"):
+            one.raycast((3, 0, 0), (-1, 0, 0), distance=100.0)
+    wide = tf.adaptive_field(csg.sphere(1.0), 0.02, domain=((-2, -2, -2), (2, 2, 2)))
+    assert np.abs(np.linalg.norm(wide.surface(0.5).vertices, axis=1) - 1.5).max() < 0.05
+    half = tf.adaptive_field(csg.sphere(1.0), 0.02, domain=((0, -1, -1), (2, 1, 1)))
+    assert half.surface(0.2).check().watertight
+    plane = tf.adaptive_field(tf.polygons.letter_r(), 0.01)
+    assert plane.surface(0.05).check().watertight
+    with pytest.raises(tf.TruefieldError, match="domain"):
+        plane.surface(0.5)
+
+
+def test_the_nearest_points_lie_on_the_surface(ball: tf.AdaptiveField) -> None:
+    low, high = ball.extent
+    points = np.random.default_rng(5).uniform(low, high, (3000, 3))
+    points[0] = (0.5, 0.0, 0.0)
+    found = ball.nearest(points)
+    assert np.array_equal(found.distance, ball.distance(points))
+    assert np.array_equal(found.normal, ball.gradient(points))
+    assert (found.triangle == -1).all()
+    assert (found.feature == 0).all()
+    away = np.linalg.norm(points - [0.5, 0.0, 0.0], axis=1) - 1.0
+    assert np.abs(np.linalg.norm(found.point - [0.5, 0.0, 0.0], axis=1) - 1.0).max() < 0.005
+    assert (np.linalg.norm(points - found.point, axis=1) - np.abs(away)).max() < 0.01
+    beyond = ball.nearest([(9.0, 0.0, 0.0)])
+    assert np.isnan(beyond.distance).all()
+    assert np.isnan(beyond.point).all()
+    assert beyond.triangle[0] == -1
+
+
+def test_exact_fields_name_the_nearest_triangle() -> None:
+    part = tf.shapes.six_pointed_star()
+    field, surface = tf.adaptive_field(part, method="exact"), tf.Surface(part)
+    points = np.random.default_rng(6).uniform(*field.extent, (2000, 3))
+    found, truth = field.nearest(points), surface.nearest(points)
+    for name in ("distance", "point", "triangle", "feature"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(truth, name))
+    # An edit may have taken the nearest place: then it is looked for.
+    low, high = part.extent
+    carved = field.carve(csg.box(0.6 * (high - low), center=high))
+    known = carved.nearest(points)
+    met = np.isfinite(known.point).all(axis=1)
+    assert met.mean() > 0.99
+    below, above = carved.bounds(known.point[met])
+    assert np.minimum(np.abs(below), np.abs(above)).max() < 0.01
+    assert (known.triangle == -1).all()
+
+
 def test_collisions_hold_the_truth() -> None:
     a = csg.sphere(1.0)
     apart = tf.collide(a, csg.sphere(0.5, center=(2.0, 0.0, 0.0)))

@@ -22,6 +22,7 @@ __all__ = [
     "__version__",
     "adaptive_field_from_levels",
     "adaptive_field_levels",
+    "adaptive_nearest",
     "adaptive_surface",
     "capsule",
     "cast_rays",
@@ -548,6 +549,9 @@ def occluded_rays(
     threads: int | None = None,
     progress: _Progress = None,
 ) -> NDArray[np.bool_]: ...
+def adaptive_nearest(
+    field: AdaptiveField, points: _Floats, threads: int | None = None, progress: _Progress = None
+) -> tuple[_Floats, NDArray[np.int64], NDArray[np.uint8]]: ...
 def adaptive_surface(
     field: AdaptiveField,
     distance: float,

@@ -16,6 +16,7 @@ from truefield.errors import TruefieldError
 from truefield.fields import Surface
 from truefield.files import PathLike
 from truefield.mesh import TriangleMesh
+from truefield.nearest import Nearest
 from truefield.sampled import SampledField
 from truefield.shape import Shape, Solid, unite
 from truefield.shape import shape as as_shape
@@ -153,6 +154,28 @@ class AdaptiveField:
         """(n, 3) float64 unit vectors in which the field grows fastest, outward; NaN outside the domain."""
         return self._native.gradient(arguments.points(points), threads, progress)
 
+    def nearest(self, points: ArrayLike, *, threads: int | None = None, progress: Progress | None = None) -> Nearest:
+        """Where the surface is nearest, from `points`.
+
+        `.distance` and `.normal` are those of `distance` and `gradient`. Of a field with `method="exact"` that was not
+        edited, `.point`, `.triangle` and `.feature` are the mesh's, exactly. Of others `.point` is an estimate, found
+        by walking down `distance`, and then along the surface for as long as that comes nearer, to where `distance` is
+        within a thousandth of the tolerance, or within the tolerance itself where the field has no such place, so that
+        `bounds` of it says how far from the surface it may be; `.triangle` is -1 and `.feature` 0. On balls, boxes, a
+        torus and a casting-like part, tolerance a thousandth of the longest side, 99 of 100 were no more than a
+        twentieth of that side farther than the nearest one; 2 to 5 microseconds a point. All NaN, and -1, outside the
+        domain, and `.point` NaN where the field is too coarse to lead to its surface.
+        """
+        points = arguments.points(points)
+        point, triangle, feature = _truefield.adaptive_nearest(self._native, points, threads, progress)
+        return Nearest(
+            self.distance(points, threads=threads, progress=progress),
+            point,
+            triangle,
+            feature,
+            self.gradient(points, threads=threads, progress=progress),
+        )
+
     def raycast(
         self,
         origins: ArrayLike,
@@ -181,7 +204,8 @@ class AdaptiveField:
         error is what `bounds` say. The first call at a distance looks at every cell, some 30 milliseconds a million.
 
         Raises:
-            TruefieldError: origins or directions are not (n, 3) finite numbers, or a direction is zero.
+            TruefieldError: origins or directions are not (n, 3) finite numbers, a direction is zero, or the surface at
+                `distance` would leave the domain, of a field whose domain holds the whole solid.
         """
         start, along = _rays(origins, directions)
         level = arguments.number("distance", distance)
@@ -225,12 +249,13 @@ class AdaptiveField:
 
         Guaranteed for any field: each side of a triangle belongs to just one other, which runs along it the other
         way, and the triangles around a vertex are one fan: closed, oriented outward, manifold; cells of different size
-        leave no cracks; each vertex lies in its cell. The solid is closed where the domain ends. Not guaranteed: where
-        cells are large beside the shape, triangles may cross each other or have no area (`TriangleMesh.check` tells),
-        and parts thinner than a cell are not seen where no corner of a cell lies in them.
+        leave no cracks; each vertex lies in its cell. A solid that the domain cuts is closed there. Not guaranteed:
+        where cells are large beside the shape, triangles may cross each other or have no area (`TriangleMesh.check`
+        tells), and parts thinner than a cell are not seen where no corner of a cell lies in them.
 
         Raises:
-            TruefieldError: no corner of a cell is below `distance`.
+            TruefieldError: no corner of a cell is below `distance`; or the surface at `distance` would leave the
+                domain, of a field whose domain holds the whole solid: build it with a larger `domain`.
             MemoryError: the mesh does not fit.
         """
         of = self.shape if shape is None else as_shape(shape)

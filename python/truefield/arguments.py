@@ -17,9 +17,13 @@ _MOST_CELLS_ALONG_A_SIDE = 2**31
 
 
 def points(points: ArrayLike) -> Floats:
-    """(n, 3) float64, C-contiguous; a single point may be given as (3,)."""
+    """(n, 3) float64, C-contiguous and aligned; a single point may be given as (3,)."""
     try:
-        array = np.ascontiguousarray(points, dtype=np.float64)
+        given = np.asarray(points)
+        # A cast would drop imaginary parts, take dates for numbers and masked places for known ones.
+        if given.dtype.kind in "cmM" or np.ma.is_masked(points):
+            raise TypeError
+        array = np.require(given, np.float64, ["C", "A"])
     except (TypeError, ValueError):
         raise TruefieldError("points are not numbers; give an array of shape (n, 3)") from None
     if array.ndim == 1 and array.shape[0] == 3:

@@ -59,6 +59,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(csg::cuboid, module)?)?;
     module.add_function(wrap_pyfunction!(products::cast_rays, module)?)?;
     module.add_function(wrap_pyfunction!(products::occluded_rays, module)?)?;
+    module.add_function(wrap_pyfunction!(products::adaptive_nearest, module)?)?;
     module.add_function(wrap_pyfunction!(products::adaptive_surface, module)?)?;
     module.add_function(wrap_pyfunction!(products::collide_solids, module)?)?;
     module.add_function(wrap_pyfunction!(products::field_outline, module)?)?;

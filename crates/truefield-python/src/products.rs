@@ -6,6 +6,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonl
 use pyo3::prelude::*;
 use truefield::product::collide::{Contact, collide};
 use truefield::product::dual;
+use truefield::product::nearest::nearest;
 use truefield::product::raycast::Method;
 use truefield::product::render::{Background, Canvas, Finish, render_field};
 use truefield::{Aabb, Distance, Error};
@@ -63,6 +64,27 @@ pub fn occluded_rays<'py>(
     let (origins, directions, method) = (points(&origins)?, points(&directions)?, self::method(method)?);
     let found = job(py, threads, progress, |run| field.caster(distance, run)?.occluded(&origins, &directions, length, method, run))?;
     Ok(column(py, found.into_iter()))
+}
+
+type Places<'py> = (Rows<'py>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>);
+
+/// `(point, triangle, feature)`: where the surface is nearest; without a triangle -1 and 0.
+#[pyfunction]
+#[pyo3(name = "adaptive_nearest", signature = (field, points, threads=None, progress=None))]
+pub fn adaptive_nearest<'py>(
+    py: Python<'py>,
+    field: &PyAdaptiveField,
+    points: PyReadonlyArray2<'py, f64>,
+    threads: Option<usize>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Places<'py>> {
+    let points = self::points(&points)?;
+    let feet = job(py, threads, progress, |run| nearest(&field.field, &points, run))?;
+    Ok((
+        rows(py, feet.iter().map(|foot| foot.point))?,
+        column(py, feet.iter().map(|foot| foot.on.map_or(-1, |(triangle, _)| i64::from(triangle)))),
+        column(py, feet.iter().map(|foot| foot.on.map_or(0, |(_, feature)| feature.code()))),
+    ))
 }
 
 /// `(vertices, triangles, lowest corner, highest corner)` of the surface at a distance.

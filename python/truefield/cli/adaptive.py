@@ -47,18 +47,28 @@ def adaptive(
         Rule,
         typer.Option("--rule", help="Divide cells until their error is proven, or until 19 samples agree: quicker."),
     ] = Rule.VERIFIED,
+    margin: Annotated[
+        float | None,
+        typer.Option(
+            "--margin",
+            show_default="an eighth of the longest side",
+            help="How far the field goes beyond the box of the part; its surfaces are grown no farther.",
+        ),
+    ] = None,
     sign: SignRule = Sign.AUTO,
     weld: Weld = None,
     threads: Threads = None,
 ) -> None:
     """The distances of a part on a tree of cells, fine where the part asks for it, each with a proven error."""
     import truefield as tf
-    from truefield import files
+    from truefield import arguments, files
 
     if output.suffix.lower() != FIELD_SUFFIX:
         raise tf.TruefieldError(f"cannot write '{output}': a field goes into a {FIELD_SUFFIX}; change the suffix")
     files.check_file(output)
     mesh = load(part, weld)
+    low, high = mesh.extent
+    room = None if margin is None else arguments.length("margin", margin, least=0.0)
     with progress() as report:
         surface = tf.Surface(mesh, sign=sign.value, threads=threads, progress=report)
         field = tf.adaptive_field(
@@ -66,6 +76,7 @@ def adaptive(
             tolerance,
             growth=growth,
             max_depth=max_depth,
+            domain=None if room is None else (low - room, high + room),
             method=method.value,
             rule=rule.value,
             threads=threads,

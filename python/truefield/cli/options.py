@@ -76,6 +76,16 @@ Askable = Annotated[
 ]
 
 
+def check_apart(*outputs: Path | None) -> None:
+    """Refuses two outputs of the same name, of which the second would replace the first."""
+    from truefield.errors import TruefieldError
+
+    given = [output.resolve() for output in outputs if output is not None]
+    for number, output in enumerate(given):
+        if output in given[:number]:
+            raise TruefieldError(f"two outputs go to '{output.name}'; give each a file of its own")
+
+
 def ready(
     part: Path, weld: float | None, sign: Sign, threads: int | None, report: Report | None
 ) -> Surface | CompleteField:

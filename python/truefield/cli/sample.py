@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Askable, Lower, Sign, SignRule, Threads, Upper, Weld, Written, ready
+from truefield.cli.options import Askable, Lower, Sign, SignRule, Threads, Upper, Weld, Written, check_apart, ready
 from truefield.cli.progress import progress
 
 
@@ -54,6 +54,7 @@ def sample(
     import truefield as tf
     from truefield import volume
 
+    check_apart(output, lower, upper)
     one = tf.Volume(np.zeros((1, 1, 1), np.float32), origin=(0.5, 0.5, 0.5))
     for path in (output, lower, upper):
         if path is not None:
@@ -76,6 +77,6 @@ def sample(
         if path is not None:
             made.holding(getattr(field, bound)).write(path)
     x, y, z = field.shape
-    least, most = float(made.values.min()), float(made.values.max())
+    least, most = float(made.values.min()) + 0.0, float(made.values.max()) + 0.0
     typer.echo(f"{output}: {x} x {y} x {z} samples {field.spacing[0]:.6g} apart, from {least:.6g} to {most:.6g}")
     typer.echo(f"sign rule: {surface.sign_rule.name}, {surface.sign_rule.reason}")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Lower, Threads, Upper, Written
+from truefield.cli.options import Lower, Threads, Upper, Written, check_apart
 from truefield.cli.progress import progress
 
 
@@ -77,6 +78,9 @@ def transform(
     import truefield as tf
     from truefield.volume import check
 
+    check_apart(output, lower, upper)
+    if threshold is not None and math.isnan(threshold):
+        raise tf.TruefieldError("--threshold is nan; give a number")
     image = tf.read_volume(volume)
     result = image.holding(np.broadcast_to(np.float32(0), image.shape))
     for path in (output, lower, upper):

@@ -15,7 +15,8 @@ from truefield.formats.polygons import FormatError
 if TYPE_CHECKING:
     from truefield.volume import Volume
 
-_CHUNK: Final = 1 << 24
+# Compressed in a tenth of a second or two, so that Ctrl-C is heard in time.
+_CHUNK: Final = 1 << 22
 _NOTE: Final = "truefield"
 
 

@@ -19,6 +19,7 @@ use loops::{Loops, Pairs, Places};
 use place::Smooth;
 use skeleton::{Copy, Leaf};
 
+use super::reach;
 use crate::distance::Source;
 use crate::error::{Error, Result};
 use crate::field::adaptive::AdaptiveField;
@@ -43,12 +44,13 @@ const CHUNK: usize = 8192;
 /// Normals are the field's, which rounds edges off within its tolerance. Where `shape`, whose field it is, is given, it is
 /// asked about each crossed edge some ten times, and sharp edges and corners are kept.
 ///
-/// Needs some 200 bytes a vertex while it runs; refuses more than `memory` bytes, a `distance` that is not finite, and one
-/// that no corner is below.
+/// Needs some 200 bytes a vertex while it runs; refuses more than `memory` bytes, a `distance` that is not finite, one
+/// that no corner is below, and one at which the surface of a solid inside the domain would leave it.
 pub fn surface(field: &AdaptiveField, distance: f64, shape: Option<&dyn Source>, memory: u64, run: &Run<'_>) -> Result<TriangleMesh> {
     if !distance.is_finite() {
         return Err(Error::invalid(format!("the distance of the surface is {distance}; give a finite length")));
     }
+    reach::check(field, distance)?;
     let mut copy = Copy::of(field, distance, run)?;
     divide(&mut copy);
     let mut crossings = crossings(&copy, distance, run)?;

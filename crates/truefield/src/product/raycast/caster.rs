@@ -4,6 +4,7 @@ use super::walk::FULL;
 use crate::error::{Error, Result};
 use crate::field::adaptive::{AdaptiveField, Cell, Division, Leaf};
 use crate::geom::{Aabb, DVec3};
+use crate::product::reach;
 use crate::run::Run;
 
 /// Cells of this depth are looked at as blocks of their own.
@@ -81,6 +82,7 @@ impl Caster {
         if !distance.is_finite() {
             return Err(Error::invalid(format!("the distance of the surface is {distance}; give a finite length")));
         }
+        reach::check(field, distance)?;
         let mut blocks = Vec::new();
         field.walk(&mut |cell| {
             let block = cell.is_leaf() || cell.depth() == BLOCK_DEPTH;
