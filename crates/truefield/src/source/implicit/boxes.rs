@@ -16,6 +16,9 @@ const LEVELS: u32 = 13;
 /// How far around a box the formula keeps its sign, in sizes of the box, where it may touch zero in it without surface.
 const MARGIN: f64 = 1e-3;
 
+/// How far around a leaf its sheet is known, in sizes of the box: a foot in it then is proven nearest in its neighbours, too.
+const AROUND: f64 = 0.5;
+
 /// Steps toward the other side.
 const BEYOND: usize = 8;
 
@@ -35,6 +38,8 @@ pub(super) struct Node {
     pub sure: bool,
     /// The number of its sheet, and of its expansion.
     pub sheet: Option<u32>,
+    /// The number of what is known of an inner node as of one sheet.
+    slab: Option<u32>,
 }
 
 impl Node {
@@ -48,8 +53,11 @@ impl Node {
 #[derive(Clone, Debug)]
 pub(super) struct Boxes {
     pub nodes: Vec<Node>,
+    /// What is known around leaves.
     pub sheets: Vec<Sheet>,
     pub taylors: Vec<Taylor>,
+    /// What is known of inner nodes, and around them.
+    slabs: Vec<(Taylor, Sheet)>,
     /// Around all that is not outside.
     pub solid: Aabb,
     /// Whether some leaf has no sheet.
@@ -62,14 +70,21 @@ pub(super) struct Boxes {
 enum Fate {
     Gone(Side),
     Leaf(Option<Box<(Taylor, Sheet)>>, f32),
-    Split,
+    Split(Option<Box<(Taylor, Sheet)>>),
 }
 
 impl Boxes {
     /// Looks at the domain and all halves of what may hold surface, level by level.
     pub(super) fn build(tape: &Tape, domain: &Aabb, run: &Run<'_>) -> Result<Self> {
-        let mut boxes =
-            Self { nodes: vec![node(*domain)], sheets: Vec::new(), taylors: Vec::new(), solid: Aabb::EMPTY, rough: false, widest: 0.0 };
+        let mut boxes = Self {
+            nodes: vec![node(*domain)],
+            sheets: Vec::new(),
+            taylors: Vec::new(),
+            slabs: Vec::new(),
+            solid: Aabb::EMPTY,
+            rough: false,
+            widest: 0.0,
+        };
         let mut level = 0..1;
         for depth in 0..=LEVELS {
             let cells: Vec<Aabb> = boxes.nodes[level.clone()].iter().map(|node| node.extent).collect();
@@ -78,12 +93,12 @@ impl Boxes {
                 Ok(part.iter().map(|cell| fate(tape, domain, cell)).collect::<Vec<_>>())
             })?;
             let fates: Vec<Fate> = fates.into_iter().flatten().collect();
-            let open = fates.iter().filter(|fate| matches!(fate, Fate::Split)).count();
+            let open = fates.iter().filter(|fate| matches!(fate, Fate::Split(_))).count();
             let last = depth == LEVELS || open * 8 > MOST;
             let start = boxes.nodes.len();
             for (index, fate) in level.clone().zip(fates) {
                 let extent = boxes.nodes[index].extent;
-                let fate = if last && matches!(fate, Fate::Split) { Fate::Leaf(None, crossed(tape, domain, &extent)) } else { fate };
+                let fate = if last && matches!(fate, Fate::Split(_)) { Fate::Leaf(None, crossed(tape, domain, &extent)) } else { fate };
                 match fate {
                     Fate::Gone(Side::Outside) => boxes.nodes[index].known = f32::NAN,
                     Fate::Gone(Side::Inside) => {
@@ -104,7 +119,11 @@ impl Boxes {
                             (boxes.sheets.len() - 1) as u32
                         });
                     }
-                    Fate::Split => {
+                    Fate::Split(slab) => {
+                        boxes.nodes[index].slab = slab.map(|slab| {
+                            boxes.slabs.push(*slab);
+                            (boxes.slabs.len() - 1) as u32
+                        });
                         boxes.nodes[index].first = boxes.nodes.len() as u32;
                         let before = boxes.nodes.len();
                         boxes.nodes.extend(halves(&extent).into_iter().map(node));
@@ -167,28 +186,14 @@ impl Boxes {
     }
 
     /// The root, if there is one.
-    pub(super) fn root(&self) -> &[u32] {
-        if self.nodes.is_empty() { &[] } else { &[0] }
+    pub(super) fn root(&self) -> Option<u32> {
+        (!self.nodes.is_empty()).then_some(0)
     }
 
-    /// The leaves that are not farther from `cell` than `reach`; `None` where they are more than `most`.
-    pub(super) fn leaves_near(&self, cell: &Aabb, reach: f64, most: usize) -> Option<Vec<u32>> {
-        let (mut leaves, mut pending) = (Vec::new(), self.root().to_vec());
-        while let Some(index) = pending.pop() {
-            let node = &self.nodes[index as usize];
-            let apart = (node.extent.min - cell.max).max(cell.min - node.extent.max).max(DVec3::ZERO).length();
-            if apart > reach * (1.0 + 1e-14) {
-                continue;
-            }
-            if node.count == 0 {
-                leaves.push(index);
-            }
-            pending.extend(node.first..node.first + u32::from(node.count));
-            if leaves.len() > most {
-                return None;
-            }
-        }
-        Some(leaves)
+    /// The surface in a node to second order, and what is known around it.
+    pub(super) fn content(&self, node: &Node) -> Option<(&Taylor, &Sheet)> {
+        let leaf = |sheet: u32| (&self.taylors[sheet as usize], &self.sheets[sheet as usize]);
+        node.sheet.map(leaf).or_else(|| node.slab.map(|slab| &self.slabs[slab as usize]).map(|(taylor, sheet)| (taylor, sheet)))
     }
 
     /// How well the surface near `cell` is known: the worst of the leaves that are not farther from it than `reach`.
@@ -211,7 +216,7 @@ impl Boxes {
 }
 
 fn node(extent: Aabb) -> Node {
-    Node { extent, first: 0, count: 0, known: 0.0, sure: false, sheet: None }
+    Node { extent, first: 0, count: 0, known: 0.0, sure: false, sheet: None, slab: None }
 }
 
 fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
@@ -223,10 +228,26 @@ fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
         Content::Open if let Some(side) = touched() => Fate::Gone(side),
         Content::Sheet(sheet) => {
             let known = if sound(&sheet.1, domain) { 0.0 } else { crossed(tape, domain, &sheet.1.extent) };
-            Fate::Leaf(Some(sheet), known)
+            Fate::Leaf(Some(Box::new((sheet.0, around(tape, domain, cell)))), known)
         }
-        Content::Open => Fate::Split,
+        Content::Open => Fate::Split(slab(tape, domain, cell)),
     }
+}
+
+/// What is known of a box as of one sheet, where it has second derivatives, and around it.
+fn slab(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Option<Box<(Taylor, Sheet)>> {
+    let sheet = Sheet::over(tape, cell);
+    if !sheet.turns.width().is_finite() {
+        return None;
+    }
+    let taylor = Taylor::of(tape, &sheet);
+    taylor.thickness().is_finite().then(|| Box::new((taylor, around(tape, domain, cell))))
+}
+
+/// What is known of a box and around it, within the domain.
+fn around(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Sheet {
+    let more = cell.size() * AROUND;
+    Sheet::over(tape, &Aabb::new((cell.min - more).max(domain.min), (cell.max + more).min(domain.max)))
 }
 
 /// Whether any part of the sheet that cannot be told from surface is next to surface within the domain: along the faces

@@ -1,7 +1,7 @@
 //! The nearest point of one sheet: found in plain numbers, then proven.
 
 use super::jet::Jet;
-use super::matrix::{eigenvalues, fall, penalised, times};
+use super::matrix::{fall, middle, middle_of};
 use super::number::Number;
 use super::sheet::{Sheet, Side};
 use super::tape::Tape;
@@ -14,6 +14,15 @@ pub(super) struct Foot {
     /// `point - p + multiplier * gradient = 0`, but for axes on which the box holds the point back.
     pub multiplier: f64,
     pub gradient: DVec3,
+}
+
+/// What is proven around a foot.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Proof {
+    /// The surface is no nearer, squared,
+    pub bound: f64,
+    /// in this box.
+    pub within: Aabb,
 }
 
 impl Foot {
@@ -64,47 +73,81 @@ impl Foot {
         })
     }
 
-    /// No more than the squared distance from `p` to the surface in the sheet's reach.
+    /// What is proven of the squared distance from `p` to the surface around the foot, where the formula is as `sheet` says.
     ///
-    /// On the surface f = 0, so |x - p|^2 equals w(x) = |x - p|^2 + 2 a f + b f^2 for any a and b. Where w is convex, it is
-    /// nowhere below its tangent at the foot, and there the tangent is nearly level. `here` is what is certain at the foot.
-    pub(super) fn proof(&self, here: &Jet<Interval, 0>, p: DVec3, sheet: &Sheet) -> f64 {
-        let turned = 1.0 + (self.multiplier * sheet.turns.lower).min(self.multiplier * sheet.turns.upper);
-        let least = turned - 1e-14 * (1.0 + self.multiplier.abs() * sheet.turns.upper.max(-sheet.turns.lower));
-        let best = if least.is_finite() { self.tangent(p, sheet, here, 0.0, least) } else { f64::NEG_INFINITY };
-        if least >= 0.0 {
-            return best;
+    /// With x the foot, q = x + u on the surface and H a mean of second derivatives between them, f(x) + g u + u H u / 2 = 0, so
+    /// that |q - p|^2 = |x - p|^2 + 2 a f(x) + 2 (x - p + a g) u + u (I + a H) u for any a. The same equation says that u leaves
+    /// the tangent plane by no more than the surface bends: there the last term is nearly that of tangential directions.
+    /// `here` is what is certain at the foot, `reach` holds it and is a part of where `sheet` holds.
+    pub(super) fn proof(&self, here: &Jet<Interval, 0>, p: DVec3, sheet: &Sheet, reach: &Aabb) -> Proof {
+        let x = self.point;
+        let (slope, doubt) = middle_of(&here.gradient);
+        let steepness = slope.length() - doubt;
+        let way = x - p;
+        // Faces of the box hold the foot back: beyond them is nothing to be nearer.
+        let free =
+            DVec3::from_array(std::array::from_fn(|axis| if x[axis] > reach.min[axis] && x[axis] < reach.max[axis] { 1.0 } else { 0.0 }));
+        let square = (slope * free).length_squared();
+        let a = if square > 0.0 { -way.dot(slope * free) / square } else { self.multiplier };
+        let size = sheet.turns.upper.max(-sheet.turns.lower);
+        let nothing = Proof { bound: f64::NEG_INFINITY, within: *reach };
+        if !(steepness > 0.0 && a.is_finite() && size.is_finite()) {
+            return nothing;
         }
-        let square = self.gradient.length_squared();
-        let along = times(&sheet.hessian.map(|h| 0.5 * (h.lower + h.upper)), self.gradient).dot(self.gradient) / square;
-        let weight = (0.5 + (-self.multiplier * along).max(0.0)) / square;
-        let least = eigenvalues(&penalised(&sheet.hessian, self.multiplier, weight, &sheet.gradient, sheet.value)).lower;
-        if least.is_finite() { best.max(self.tangent(p, sheet, here, weight, least)) } else { best }
+        let bend = sheet.bend(a, slope / slope.length());
+        let most = (reach.max - x).max(x - reach.min).length();
+        let off = |most: f64| (0.5 * size * most + doubt) / steepness * (1.0 + 1e-14);
+        let (mut least, mut within) = (bend.whole.max(bend.least(off(most))), *reach);
+        if !(least > 0.0) {
+            // Nearer to the foot, less leaves the tangent plane.
+            let near = 0.9 * 2.0 * (bend.most_off() * steepness - doubt) / size;
+            if near > 0.0 {
+                let half = near / 3.0_f64.sqrt();
+                (least, within) = (bend.least(off(near)), Aabb::new((x - half).max(reach.min), (x + half).min(reach.max)));
+            }
+        }
+        // What the value at the foot, if not 0, moves q off the tangent plane.
+        let aside = here.value.upper.max(-here.value.lower) / steepness * (1.0 + 1e-14);
+        let blur = aside * (bend.mixed + bend.both() * off(most)) + a.abs() * doubt;
+        let (mut loss, mut total) = (0.0, 0.0);
+        for axis in 0..3 {
+            let back = way[axis] + a * slope[axis];
+            let open = blur + 4.0 * f64::EPSILON * (way[axis].abs() + (a * slope[axis]).abs());
+            let (low, high) = (within.min[axis] - x[axis], within.max[axis] - x[axis]);
+            loss += fall(2.0 * (back - open), least, low, high).min(fall(2.0 * (back + open), least, low, high));
+            let reach = high.max(-low);
+            total += (2.0 * (back.abs() + open) + least.abs() * reach) * reach;
+        }
+        let value = here.value.mul(Interval::exact(2.0 * a));
+        let square = way.length_squared() * (1.0 - 8.0 * f64::EPSILON);
+        Proof { bound: square + value.lower + loss - bend.both() * aside * aside - 1e-14 * total, within }
     }
 
-    /// The lower bound over the box of `sheet` when half the second derivatives of w have no eigenvalue below `least`.
-    fn tangent(&self, p: DVec3, sheet: &Sheet, here: &Jet<Interval, 0>, weight: f64, least: f64) -> f64 {
-        let (way, reach, value) = (self.point - p, &sheet.extent, here.value);
-        let (a, b) = (Interval::exact(2.0 * self.multiplier), Interval::exact(weight));
-        let constant = value.mul(a).add(value.square().mul(b));
-        let slope = a.add(value.mul(b).mul(Interval::exact(2.0)));
-        let (mut loss, mut size) = (0.0, 0.0);
-        for axis in 0..3 {
-            let back = Interval::around(2.0 * way[axis], 2.0 * f64::EPSILON * way[axis].abs());
-            let tilt = here.gradient[axis].mul(slope).add(back);
-            let (low, high) = (reach.min[axis] - self.point[axis], reach.max[axis] - self.point[axis]);
-            loss += fall(tilt.lower, least, low, high).min(fall(tilt.upper, least, low, high));
-            let reach = high.max(-low);
-            size += (tilt.lower.abs().max(tilt.upper.abs()) + least.abs() * reach) * reach;
+    /// How far from `p` the surface is at most, which lies between `p` and a point next to the foot, on `side`.
+    ///
+    /// `here` is what is certain at the foot.
+    pub(super) fn reached(&self, tape: &Tape, here: &Jet<Interval, 0>, p: DVec3, side: Side, sheet: &Sheet, limits: &Aabb) -> f64 {
+        let (slope, doubt) = middle_of(&here.gradient);
+        let (level, radius) = middle(here.value);
+        let (steepness, normal) = (slope.length(), slope.normalize_or_zero());
+        let size = sheet.turns.upper.max(-sheet.turns.lower);
+        // Onto the tangent plane, and beyond what the formula may differ from it.
+        let onto = -level / steepness;
+        let least = 2.0 * f64::EPSILON * (self.point.abs().max_element() + p.abs().max_element() + limits.diagonal());
+        let more = 2.0 * (radius + doubt * onto.abs() + size * onto * onto) / steepness + least;
+        let far = onto + more * side.sign();
+        let there = self.point + normal * far;
+        let sure = more * steepness * (1.0 - 1e-14) - radius - doubt * far.abs() - 0.5 * size * far * far * (1.0 + 1e-14) > 0.0;
+        if sure && sheet.extent.contains(there - least) && sheet.extent.contains(there + least) {
+            return (there - p).length() * (1.0 + 4.0 * f64::EPSILON) + least;
         }
-        let square = way.length_squared() * (1.0 - 8.0 * f64::EPSILON);
-        square + constant.lower + loss - 1e-14 * size
+        self.beyond(tape, here, p, side, limits)
     }
 
     /// How far from `p` a point next to the foot is that certainly lies on `side`; infinite where none is found.
     ///
     /// Where `p` lies on the other side, the surface is not farther. `here` is what is certain at the foot.
-    pub(super) fn beyond(&self, tape: &Tape, here: &Jet<Interval, 0>, p: DVec3, side: Side, limits: &Aabb) -> f64 {
+    fn beyond(&self, tape: &Tape, here: &Jet<Interval, 0>, p: DVec3, side: Side, limits: &Aabb) -> f64 {
         let mut direction = self.gradient * side.sign();
         for axis in 0..3 {
             let out = direction[axis];
@@ -165,18 +208,24 @@ fn newton(hessian: &[f64; 6], value: f64, gradient: DVec3, away: DVec3, free: DV
         return None;
     }
     let multiplier = if multiplier.is_nan() { slope.dot(away) / square } else { multiplier };
-    let (with_away, with_slope) =
-        solve(hessian, multiplier, free, away, slope).filter(|(_, s)| s.dot(slope) > 1e-3 * square).unwrap_or((away, slope));
+    // Along the gradient the step is given: what is added there makes the matrix positive and changes the multiplier only.
+    let bent = hessian.iter().map(|h| h.abs()).sum::<f64>();
+    let weight = 2.0 * multiplier.abs() * bent / square;
+    let (with_away, with_slope, weight) = solve(hessian, multiplier, free, weight, slope, away)
+        .filter(|(_, s)| s.dot(slope) * (1.0 + weight * square) > 1e-3 * square)
+        .map_or((away, slope, 0.0), |(a, s)| (a, s, weight));
     let next = (slope.dot(with_away) + value) / slope.dot(with_slope);
     let step = with_away - with_slope * next;
+    let next = next - weight * value;
     (step.is_finite() && next.is_finite()).then_some((step, next))
 }
 
-/// Solutions for two right sides of (I + `scale` H) x = b on the free axes, where that matrix is positive.
-fn solve(hessian: &[f64; 6], scale: f64, free: DVec3, a: DVec3, b: DVec3) -> Option<(DVec3, DVec3)> {
+/// Solutions of (I + `scale` H + `weight` b b^T) x = a on the free axes and of the same for b, where that matrix is positive.
+fn solve(hessian: &[f64; 6], scale: f64, free: DVec3, weight: f64, b: DVec3, a: DVec3) -> Option<(DVec3, DVec3)> {
     let [xx, yy, zz, xy, xz, yz] = hessian.map(|h| h * scale);
-    let (xx, yy, zz) = (1.0 + xx * free.x, 1.0 + yy * free.y, 1.0 + zz * free.z);
-    let (xy, xz, yz) = (xy * free.x * free.y, xz * free.x * free.z, yz * free.y * free.z);
+    let more = b * weight;
+    let (xx, yy, zz) = (1.0 + xx * free.x + more.x * b.x, 1.0 + yy * free.y + more.y * b.y, 1.0 + zz * free.z + more.z * b.z);
+    let (xy, xz, yz) = (xy * free.x * free.y + more.x * b.y, xz * free.x * free.z + more.x * b.z, yz * free.y * free.z + more.y * b.z);
     // Cholesky's decomposition without roots.
     let d0 = xx;
     if !(d0 > 1e-6) {

@@ -21,7 +21,41 @@ fn ordered(lower: f64, upper: f64) -> Interval {
 
 /// Ends that were rounded once, to the nearest.
 fn outward(lower: f64, upper: f64) -> Interval {
-    ordered(lower.next_down(), upper.next_up())
+    ordered(lower - step(lower), upper + step(upper))
+}
+
+/// No less than the step from a number to its neighbours: in two operations, unlike the step itself.
+fn step(value: f64) -> f64 {
+    value.abs() * f64::EPSILON + f64::MIN_POSITIVE
+}
+
+/// The product where some end is infinite, or the width of either is.
+#[cold]
+fn wide_product(a: Interval, b: Interval) -> Interval {
+    if a.is_zero() && b.upper - b.lower < f64::INFINITY || b.is_zero() && a.upper - a.lower < f64::INFINITY {
+        return Interval::exact(0.0);
+    }
+    if a == Interval::ALL || b == Interval::ALL {
+        return Interval::ALL;
+    }
+    let products = [a.lower * b.lower, a.lower * b.upper, a.upper * b.lower, a.upper * b.upper];
+    // 0 times an end that is infinite is no number: the end stands for numbers beyond all bounds, times 0 is 0.
+    product_of(a, b, products.map(|p| if p.is_nan() { 0.0 } else { p }))
+}
+
+/// The least and the greatest of what the ends make; rounding does not take it over zero.
+fn product_of(a: Interval, b: Interval, [p, q, r, s]: [f64; 4]) -> Interval {
+    let less = |x: f64, y: f64| if x < y { x } else { y };
+    let more = |x: f64, y: f64| if x > y { x } else { y };
+    let mut product = outward(less(less(p, q), less(r, s)), more(more(p, q), more(r, s)));
+    let (down, up, other_down, other_up) = (a.lower >= 0.0, a.upper <= 0.0, b.lower >= 0.0, b.upper <= 0.0);
+    if down & other_down | up & other_up {
+        product.lower = product.lower.max(0.0);
+    }
+    if down & other_up | up & other_down {
+        product.upper = product.upper.min(0.0);
+    }
+    product
 }
 
 /// A value of the mathematics library, lowered by its error.
@@ -113,25 +147,14 @@ impl Number for Interval {
     }
 
     fn mul(self, other: Self) -> Self {
-        if self.is_zero() && other.upper - other.lower < f64::INFINITY || other.is_zero() && self.upper - self.lower < f64::INFINITY {
+        if !(self.upper - self.lower < f64::INFINITY && other.upper - other.lower < f64::INFINITY) {
+            return wide_product(self, other);
+        }
+        if self.is_zero() || other.is_zero() {
             return Self::exact(0.0);
         }
         let products = [self.lower * other.lower, self.lower * other.upper, self.upper * other.lower, self.upper * other.upper];
-        // 0 times an end that is infinite is no number: the end stands for numbers beyond all bounds, times 0 is 0.
-        let [a, b, c, d] = products.map(|p| if p.is_nan() { 0.0 } else { p });
-        let mut product = outward(a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-        if self == Self::ALL || other == Self::ALL {
-            return Self::ALL;
-        }
-        let (down, up) = (self.lower >= 0.0, self.upper <= 0.0);
-        let (other_down, other_up) = (other.lower >= 0.0, other.upper <= 0.0);
-        if down && other_down || up && other_up {
-            product.lower = product.lower.max(0.0);
-        }
-        if down && other_up || up && other_down {
-            product.upper = product.upper.min(0.0);
-        }
-        product
+        product_of(self, other, products)
     }
 
     fn div(self, other: Self) -> Self {

@@ -31,21 +31,23 @@ pub(super) fn eigenvalues(matrix: &[Interval; 6]) -> Interval {
     if !spread.is_finite() {
         return Interval::ALL;
     }
-    let (diagonal, off) = diagonal(parts.map(|(m, _)| m));
+    // What is left beside the diagonal is counted, too: it need not be smaller than what is.
+    let (diagonal, off) = diagonal(parts.map(|(m, _)| m), 1e-3 * spread);
     let least = diagonal[0].min(diagonal[1]).min(diagonal[2]);
     let greatest = diagonal[0].max(diagonal[1]).max(diagonal[2]);
     Interval { lower: least - off - spread, upper: greatest + off + spread }.widen(1e-13 * (least.abs().max(greatest.abs()) + spread))
 }
 
-/// The diagonal after rotations that make all else small, and no less than the norm of all else.
-fn diagonal(matrix: [f64; 6]) -> ([f64; 3], f64) {
+/// The diagonal after rotations that make all else about `enough`, and no less than the norm of all else.
+fn diagonal(matrix: [f64; 6], enough: f64) -> ([f64; 3], f64) {
     let mut m = [[0.0; 3]; 3];
     for (k, (i, j)) in PAIRS.into_iter().enumerate() {
         (m[i][j], m[j][i]) = (matrix[k], matrix[k]);
     }
     let size = matrix.iter().fold(0.0_f64, |size, entry| size.max(entry.abs()));
+    let enough = enough.max(1e-12 * size);
     for _ in 0..6 {
-        if m[0][1].abs() + m[0][2].abs() + m[1][2].abs() <= 1e-15 * size {
+        if m[0][1].abs() + m[0][2].abs() + m[1][2].abs() <= enough {
             break;
         }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {

@@ -3,7 +3,7 @@
 use std::collections::BinaryHeap;
 
 use super::boxes::{Boxes, Node, halves};
-use super::foot::Foot;
+use super::foot::{Foot, Proof};
 use super::sheet::{Content, Sheet, Side};
 use super::tape::Tape;
 use super::taylor::Taylor;
@@ -29,7 +29,7 @@ const SHRINKS: usize = 8;
 const STEPS: usize = 16;
 
 /// They double their digits: where one was this small, in sizes of the box, it is the last.
-const DONE: f64 = 1e-9;
+const DONE: f64 = 1e-5;
 
 /// Boxes are farther than the surface for certain, where they are by this part.
 const CLEAR: f64 = 1.0 + 1e-9;
@@ -98,8 +98,14 @@ pub(super) struct Search<'a> {
     foot: Option<DVec3>,
     /// Boxes whose surface is no nearer than `floor` says.
     proven: Vec<Aabb>,
+    /// Feet that no box holds back.
+    free: Vec<DVec3>,
     /// Feet around which that was tried.
     feet: Vec<DVec3>,
+    /// The leaf of the first foot.
+    started: Option<u32>,
+    /// The nodes that led there, the smallest last.
+    above: Vec<u32>,
     /// The first box that was looked into.
     first: Option<Aabb>,
 }
@@ -124,15 +130,19 @@ impl<'a> Search<'a> {
             beyond: f64::INFINITY,
             foot: None,
             proven,
+            free: Vec::new(),
             feet,
+            started: None,
+            above: Vec::new(),
             first: None,
         }
     }
 
-    /// Searches the tree from these nodes on.
-    pub(super) fn run(mut self, nodes: &[u32]) -> Found {
-        for &node in nodes {
-            self.open(node);
+    /// Searches the tree.
+    pub(super) fn run(mut self) -> Found {
+        if let Some(root) = self.boxes.root() {
+            self.start(root);
+            self.open(root);
         }
         while let Some(Waiting { bound, item, .. }) = self.heap.pop() {
             if bound >= self.upper * self.upper {
@@ -153,11 +163,7 @@ impl<'a> Search<'a> {
             match item {
                 Place::Node(_) => {}
                 Place::Leaf(index) => self.look(bound, index),
-                Place::Sheet(index, near) => {
-                    let node = &self.boxes.nodes[index as usize];
-                    let sheet = node.sheet.map(|sheet| (self.boxes.taylors[sheet as usize], self.boxes.sheets[sheet as usize], near));
-                    self.settle(bound, &Piece { extent: node.extent, sheet, fresh: true });
-                }
+                Place::Sheet(index, near) => self.sheet(bound, index, near),
                 Place::Piece(index) => {
                     let piece = self.pieces[index as usize];
                     self.settle(bound, &piece);
@@ -187,25 +193,70 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// A foot to begin with, from the leaf to which the nearest boxes lead: what is farther is then left alone.
+    fn start(&mut self, root: u32) {
+        let (boxes, p) = (self.boxes, self.p);
+        let Some(near) = self.lead(root, |node| bound(boxes, p, node)) else { return };
+        let node = &boxes.nodes[near as usize];
+        let Some((taylor, _)) = boxes.content(node).filter(|_| bound(boxes, self.p, node) < self.upper * self.upper) else { return };
+        let from = taylor.onto(self.p).clamp(node.extent.min, node.extent.max);
+        // The foot may lie leaves away.
+        let Some(foot) = Foot::find(|x| self.tape.jet(x), self.p, from, self.domain, STEPS, DONE) else { return };
+        let Some(there) = self.lead(root, |node| node.extent.distance_squared(foot.point)) else { return };
+        let node = &boxes.nodes[there as usize];
+        let bound = bound(boxes, self.p, node);
+        if node.sheet.is_some() && node.extent.contains(foot.point) && bound < self.upper * self.upper {
+            self.started = Some(there);
+            self.sheet(bound, there, foot.point);
+        }
+        self.above.clear();
+    }
+
+    /// The leaf below a node to which the least of some number leads.
+    fn lead(&mut self, node: u32, number: impl Fn(&Node) -> f64) -> Option<u32> {
+        let mut at = node;
+        self.above.clear();
+        while self.boxes.nodes[at as usize].count > 0 {
+            let node = &self.boxes.nodes[at as usize];
+            self.above.push(at);
+            let children = node.first..node.first + u32::from(node.count);
+            let numbers = children.map(|child| (number(&self.boxes.nodes[child as usize]), child));
+            at = numbers.min_by(|a, b| a.0.total_cmp(&b.0))?.1;
+        }
+        Some(at)
+    }
+
     /// The children of a node.
     fn open(&mut self, index: u32) {
         let boxes = self.boxes;
         let node = &boxes.nodes[index as usize];
         let children = if node.count == 0 { index..index + 1 } else { node.first..node.first + u32::from(node.count) };
-        for child in children {
-            let Node { extent, count, sheet, .. } = &boxes.nodes[child as usize];
-            let mut bound = extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON);
-            if bound > self.beyond {
+        let started = self.started;
+        for child in children.filter(|child| started != Some(*child)) {
+            let node = &boxes.nodes[child as usize];
+            let nearest = node.extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON);
+            if nearest > self.beyond || nearest >= self.upper * self.upper || self.is_proven(&node.extent) {
                 continue;
             }
-            if let Some(sheet) = sheet {
-                let taylor = &boxes.taylors[*sheet as usize];
-                self.beyond = self.beyond.min((taylor.most(self.p) * CLEAR).powi(2));
-                bound = taylor.rough(self.p, extent);
+            if let Some(sheet) = node.sheet.filter(|_| self.foot.is_none()) {
+                self.beyond = self.beyond.min((boxes.taylors[sheet as usize].most(self.p) * CLEAR).powi(2));
             }
-            if self.tells(child, bound) {
-                self.enter(bound, if *count == 0 { Place::Leaf(child) } else { Place::Node(child) });
+            let mut bound = bound(boxes, self.p, node);
+            if !self.tells(child, bound) || bound >= self.upper * self.upper {
+                continue;
             }
+            if node.count > 0 {
+                self.enter(bound, Place::Node(child));
+                continue;
+            }
+            if let Some(sheet) = node.sheet {
+                bound = bound.max(self.beside(&boxes.taylors[sheet as usize], &node.extent));
+                if self.is_enough(bound) {
+                    self.floor = self.floor.min(bound);
+                    continue;
+                }
+            }
+            self.enter(bound, Place::Leaf(child));
         }
     }
 
@@ -226,7 +277,7 @@ impl<'a> Search<'a> {
         } else if let Some(sheet) = node.sheet.filter(|_| self.foot.is_none()) {
             let (taylor, sheet) = (&self.boxes.taylors[sheet as usize], &self.boxes.sheets[sheet as usize]);
             let near = taylor.least(self.p, &node.extent).1;
-            self.prove(sheet, near);
+            self.prove(sheet, &node.extent, near);
         }
     }
 
@@ -239,11 +290,21 @@ impl<'a> Search<'a> {
                     return;
                 }
                 let taylor = &self.boxes.taylors[sheet as usize];
+                if let Some(parts) = self.unproven(&node.extent) {
+                    let sheet = &self.boxes.sheets[sheet as usize];
+                    for part in parts {
+                        self.part(bound, taylor, sheet, part, true);
+                    }
+                    return;
+                }
                 let (least, near) = taylor.least_within(self.p, &node.extent, self.beyond);
                 self.beyond = self.beyond.min((taylor.most_by(self.p, near, &node.extent) * CLEAR).powi(2));
                 let bound = bound.max(least);
                 if self.is_enough(bound) {
                     self.floor = self.floor.min(bound);
+                } else if self.foot.is_none() && bound <= self.beyond {
+                    // A first foot, soon, spares looks at most others.
+                    self.sheet(bound, index, near);
                 } else {
                     self.enter(bound, Place::Sheet(index, near));
                 }
@@ -254,16 +315,31 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// A leaf with a sheet.
+    fn sheet(&mut self, bound: f64, index: u32, near: DVec3) {
+        let node = &self.boxes.nodes[index as usize];
+        let sheet = node.sheet.map(|sheet| (self.boxes.taylors[sheet as usize], self.boxes.sheets[sheet as usize], near));
+        self.settle(bound, &Piece { extent: node.extent, sheet, fresh: true });
+    }
+
     /// Proves how near the surface of a box is, or cuts the box.
     fn settle(&mut self, bound: f64, piece: &Piece) {
         let extent = &piece.extent;
         if self.is_proven(extent) {
             return;
         }
+        if let Some((taylor, sheet, _)) = &piece.sheet
+            && let Some(parts) = self.unproven(extent)
+        {
+            for part in parts {
+                self.part(bound, taylor, sheet, part, piece.fresh);
+            }
+            return;
+        }
         self.first.get_or_insert(*extent);
         let size = extent.size().max_element();
         if let Some((_, sheet, near)) = &piece.sheet {
-            if (piece.fresh || self.upper == f64::INFINITY) && self.prove(sheet, *near) {
+            if (piece.fresh || self.upper == f64::INFINITY) && self.prove(sheet, extent, *near) {
                 return;
             }
             if size <= 0.125 * self.accuracy.smooth {
@@ -291,7 +367,7 @@ impl<'a> Search<'a> {
             let mut bound = bound.max(extent.distance_squared(self.p) * (1.0 - 8.0 * f64::EPSILON));
             // What is known of the whole box may do.
             if let Some((taylor, ..)) = &piece.sheet {
-                bound = bound.max(taylor.rough(self.p, &extent));
+                bound = bound.max(taylor.rough(self.p, &extent)).max(self.beside(taylor, &extent));
                 if bound < self.upper * self.upper {
                     bound = bound.max(taylor.least(self.p, &extent).0);
                 }
@@ -321,6 +397,48 @@ impl<'a> Search<'a> {
             });
             self.add(bound, Piece { extent, sheet, fresh: !piece.fresh });
         }
+    }
+
+    /// A part of a box with a sheet.
+    fn part(&mut self, bound: f64, taylor: &Taylor, sheet: &Sheet, extent: Aabb, fresh: bool) {
+        let mut bound = bound.max(taylor.rough(self.p, &extent));
+        let mut near = extent.center();
+        if !self.is_enough(bound) {
+            bound = bound.max(self.beside(taylor, &extent));
+        }
+        if !self.is_enough(bound) {
+            let (least, at) = taylor.least(self.p, &extent);
+            (bound, near) = (bound.max(least), at);
+        }
+        if self.is_enough(bound) {
+            self.floor = self.floor.min(bound);
+        } else {
+            self.add(bound, Piece { extent, sheet: Some((*taylor, *sheet, near)), fresh });
+        }
+    }
+
+    /// No more than the squared distance to the surface in a box beside the foot.
+    fn beside(&self, taylor: &Taylor, extent: &Aabb) -> f64 {
+        self.foot.map_or(f64::NEG_INFINITY, |foot| taylor.beside(self.p, foot, extent))
+    }
+
+    /// What is left of a box beside what is proven, where that is some of it.
+    fn unproven(&self, extent: &Aabb) -> Option<impl Iterator<Item = Aabb> + use<>> {
+        let proven = *self.proven.iter().find(|proven| proven.min.max(extent.min).cmplt(proven.max.min(extent.max)).all())?;
+        let mut rest = *extent;
+        let parts: [Option<Aabb>; 6] = std::array::from_fn(|face| {
+            let (axis, mut part) = (face / 2, rest);
+            if face % 2 == 0 && rest.min[axis] < proven.min[axis] {
+                (part.max[axis], rest.min[axis]) = (proven.min[axis], proven.min[axis]);
+                Some(part)
+            } else if face % 2 == 1 && rest.max[axis] > proven.max[axis] {
+                (part.min[axis], rest.max[axis]) = (proven.max[axis], proven.max[axis]);
+                Some(part)
+            } else {
+                None
+            }
+        });
+        Some(parts.into_iter().flatten())
     }
 
     fn add(&mut self, bound: f64, piece: Piece) {
@@ -363,45 +481,60 @@ impl<'a> Search<'a> {
         self.proven.iter().any(|proven| proven.contains(extent.min) && proven.contains(extent.max))
     }
 
-    /// Looks for the foot on the sheet of a box, from `near`; whether what is known of the box is as good as wanted.
-    fn prove(&mut self, sheet: &Sheet, near: DVec3) -> bool {
-        let extent = &sheet.extent;
+    /// Looks for the foot on the sheet around a box, from `near`; whether what is known of the box is as good as wanted.
+    fn prove(&mut self, sheet: &Sheet, cell: &Aabb, near: DVec3) -> bool {
+        // Where the foot next to the box is known, others look beyond the box.
+        let extent = if self.free.iter().any(|foot| sheet.extent.contains(*foot)) { cell } else { &sheet.extent };
         // Around a foot that is known, only smaller boxes help.
-        if self.feet.iter().any(|foot| extent.contains(*foot)) {
+        if self.feet.iter().any(|foot| cell.contains(*foot)) {
             return false;
         }
         let Some(foot) = Foot::find(|x| self.tape.jet(x), self.p, near, extent, STEPS, DONE) else { return false };
         let here = self.tape.jet_over::<0>(&Aabb::new(foot.point, foot.point));
         let far = (foot.point - self.p).length();
         if far < self.upper {
-            let reached = foot.beyond(self.tape, &here, self.p, self.side.other(), self.domain);
+            let reached = foot.reached(self.tape, &here, self.p, self.side.other(), sheet, self.domain);
             if reached < self.upper {
                 self.upper = reached;
                 self.foot = Some(foot.point);
             }
         }
-        let proof = foot.proof(&here, self.p, sheet);
-        if self.is_enough(proof) {
-            self.floor = self.floor.min(proof);
+        let held = foot.is_held(extent, self.domain);
+        if !held {
+            self.free.push(foot.point);
+        }
+        if self.holds(&foot.proof(&here, self.p, sheet, extent)) && self.is_proven(cell) {
+            // What holds around the leaf may hold far around it.
+            while let Some((_, sheet)) = self.above.pop().and_then(|above| self.boxes.content(&self.boxes.nodes[above as usize]))
+                && self.holds(&foot.proof(&here, self.p, sheet, &sheet.extent))
+            {}
             return true;
         }
-        if foot.is_held(extent, self.domain) || far > self.upper {
+        if held || far > self.upper {
             return false;
         }
         self.feet.push(foot.point);
         // The wider the box around the foot, the more is proven at once; the smaller, the less derivatives differ.
-        let mut half = WIDE * extent.size().max_element();
+        let mut half = WIDE * cell.size().max_element();
         for _ in 0..SHRINKS {
             let around = Aabb::new((foot.point - half).max(self.domain.min), (foot.point + half).min(self.domain.max));
-            let proof = foot.proof(&here, self.p, &Sheet::over(self.tape, &around));
-            if self.is_enough(proof) {
-                self.floor = self.floor.min(proof);
-                self.proven.push(around);
+            if self.holds(&foot.proof(&here, self.p, &Sheet::over(self.tape, &around), &around)) {
                 break;
             }
             half *= 0.5;
         }
-        self.is_proven(extent)
+        self.is_proven(cell)
+    }
+
+    /// Keeps what is proven, if it is as good as wanted.
+    fn holds(&mut self, proof: &Proof) -> bool {
+        let holds = self.is_enough(proof.bound);
+        if holds {
+            self.floor = self.floor.min(proof.bound);
+            self.proven.retain(|proven| !(proof.within.contains(proven.min) && proof.within.contains(proven.max)));
+            self.proven.push(proof.within);
+        }
+        holds
     }
 
     /// How far apart the bounds may be: where much of the surface is nearly as far, less is asked for.
@@ -450,6 +583,14 @@ impl<'a> Search<'a> {
             }
             break;
         }
+    }
+}
+
+/// No more than the squared distance to the surface in a node.
+fn bound(boxes: &Boxes, p: DVec3, node: &Node) -> f64 {
+    match boxes.content(node) {
+        Some((taylor, _)) => taylor.rough(p, &node.extent),
+        None => node.extent.distance_squared(p) * (1.0 - 8.0 * f64::EPSILON),
     }
 }
 

@@ -11,18 +11,6 @@ use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 use crate::source::balls;
 
-/// Points that are asked together, the fewest for which leaves are looked for, and the most leaves for which that pays.
-const GROUP: usize = 64;
-const FEW: usize = 8;
-const LEAVES: usize = 96;
-
-/// The leaves that can be nearest to some of a group of points.
-struct Near {
-    leaves: Vec<u32>,
-    /// All others are farther from each of the points.
-    reach: f64,
-}
-
 /// The part of a domain where a formula is negative, with its true distance.
 ///
 /// The domain bounds the solid: where the formula is negative on a face of the domain, the face is surface, so that the
@@ -84,28 +72,7 @@ impl Implicit {
     pub(super) fn search(&self, p: DVec3, side: Side) -> Found {
         // The faces of the domain are surface to what is inside.
         let limit = if side == Side::Inside { self.depth(p) } else { f64::INFINITY };
-        Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run(self.boxes.root())
-    }
-
-    /// [`Self::search`] among the leaves that are near, with the same result.
-    fn search_near(&self, p: DVec3, side: Side, near: Option<&Near>) -> Found {
-        let Some(near) = near else { return self.search(p, side) };
-        let limit = if side == Side::Inside { self.depth(p) } else { f64::INFINITY };
-        let found = Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run(&near.leaves);
-        // All other leaves are farther than what was found, or all have to be looked at.
-        if found.upper < near.reach { found } else { self.search(p, side) }
-    }
-
-    /// The leaves that can be nearest to some of many points; `None` where these are too many, or nothing is gained.
-    fn near(&self, points: &[DVec3]) -> Option<Near> {
-        if points.len() < FEW || self.boxes.rough || !points.iter().all(|p| p.is_finite()) {
-            return None;
-        }
-        let around = Aabb::around(points.iter().copied());
-        let center = around.center();
-        let side = self.side(center.clamp(self.domain.min, self.domain.max))?;
-        let reach = self.search(center, side).upper + around.radius() * (1.0 + 1e-12) + self.accuracy.hard;
-        Some(Near { leaves: self.boxes.leaves_near(&around, reach, LEAVES)?, reach })
+        Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run()
     }
 
     /// The side of a point of the domain, where it is certain.
@@ -155,7 +122,7 @@ impl Implicit {
     }
 
     /// What is known of the distance, and the number that fields sample.
-    fn answer(&self, p: DVec3, near: Option<&Near>) -> (Interval, f64) {
+    fn answer(&self, p: DVec3) -> (Interval, f64) {
         if !p.is_finite() {
             return (Interval::ALL, f64::NAN);
         }
@@ -174,7 +141,7 @@ impl Implicit {
         if side == Side::Inside && apart > 0.0 {
             return (Interval::around(apart, rounding), apart);
         }
-        let Found { mut lower, mut upper, .. } = self.search_near(p, side, near);
+        let Found { mut lower, mut upper, .. } = self.search(p, side);
         if side == Side::Inside {
             let depth = self.depth(p);
             (lower, upper) = (lower.min(depth - rounding).max(0.0), upper.min(depth + rounding));
@@ -197,30 +164,18 @@ impl Distance for Implicit {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        self.answer(p, None).0
-    }
-
-    fn at_many(&self, points: &[DVec3], out: &mut [Interval]) {
-        for (points, out) in points.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
-            let near = self.near(points);
-            for (&p, out) in points.iter().zip(out) {
-                *out = self.answer(p, near.as_ref()).0;
-            }
-        }
+        self.answer(p).0
     }
 }
 
 impl Source for Implicit {
     fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
-        for (points, out) in points.chunks(GROUP).zip(out.chunks_mut(GROUP)) {
-            let near = self.near(points);
-            for (&p, out) in points.iter().zip(out) {
-                *out = self.answer(p, near.as_ref()).1;
-                if out.is_nan() || self.tape.value(p.clamp(self.domain.min, self.domain.max)).is_nan() {
-                    return Err(Error::invalid(format!(
-                        "the expression is not a number at {p}; give a domain in which its roots, logarithms and quotients are defined"
-                    )));
-                }
+        for (&p, out) in points.iter().zip(out) {
+            *out = self.answer(p).1;
+            if out.is_nan() || self.tape.value(p.clamp(self.domain.min, self.domain.max)).is_nan() {
+                return Err(Error::invalid(format!(
+                    "the expression is not a number at {p}; give a domain in which its roots, logarithms and quotients are defined"
+                )));
             }
         }
         Ok(())
@@ -234,7 +189,7 @@ impl Source for Implicit {
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {
-        let (at, value) = self.answer(cell.center(), None);
+        let (at, value) = self.answer(cell.center());
         let radius = cell.radius() * (1.0 + 1e-15);
         let near = at.upper.max(-at.lower) + radius;
         // Where bounds meet, the value is their middle and less than the noise from the distance. Elsewhere it is how far a

@@ -1,7 +1,7 @@
 //! What interval arithmetic proves of the surface in a box.
 
 use super::jet::Jet;
-use super::matrix::{eigenvalues, middle_of};
+use super::matrix::{eigenvalues, middle, middle_of, times};
 use super::number::Number;
 use super::tape::Tape;
 use super::taylor::Taylor;
@@ -151,6 +151,56 @@ impl Sheet {
     pub(super) fn over(tape: &Tape, extent: &Aabb) -> Self {
         let Jet { value, gradient, hessian } = tape.jet_over(extent);
         Self { extent: *extent, value, gradient, hessian, turns: eigenvalues(&hessian) }
+    }
+
+    /// What is known of I + `a` H, for any second derivatives H of it.
+    pub(super) fn bend(&self, a: f64, normal: DVec3) -> Bend {
+        let parts = self.hessian.map(middle);
+        let spread = (0..6).map(|k| if k < 3 { parts[k].1.powi(2) } else { 2.0 * parts[k].1.powi(2) }).sum::<f64>().sqrt();
+        let matrix = parts.map(|(middle, _)| middle);
+        let (first, second) = normal.any_orthonormal_pair();
+        let (turned, one, two) = (times(&matrix, normal), times(&matrix, first), times(&matrix, second));
+        let (xx, yy, xy) = (one.dot(first), two.dot(second), one.dot(second));
+        let (mean, apart) = (0.5 * (xx + yy), (0.5 * (xx - yy)).hypot(xy));
+        let along = turned.dot(normal);
+        let size = self.turns.upper.max(-self.turns.lower);
+        let doubt = a.abs() * spread * (1.0 + 1e-14) + 1e-14 * (1.0 + a.abs() * (size + spread));
+        Bend {
+            whole: 1.0 + (a * self.turns.lower).min(a * self.turns.upper) - 1e-14 * (1.0 + a.abs() * size),
+            tangential: 1.0 + (a * (mean - apart)).min(a * (mean + apart)) - doubt,
+            normal: (1.0 + a * along - doubt).min(0.0),
+            mixed: a.abs() * (turned - normal * along).length() + doubt,
+        }
+    }
+}
+
+/// No eigenvalue of I + a H is less than `whole`; along a normal and across it, more is known.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bend {
+    pub whole: f64,
+    /// Of tangential directions.
+    tangential: f64,
+    /// Of the normal, if negative.
+    normal: f64,
+    /// No less than what it mixes of a normal and any tangent.
+    pub mixed: f64,
+}
+
+impl Bend {
+    /// No more than u (I + a H) u for any u of length 1 that leaves the tangent plane by `off` at most.
+    pub(super) fn least(&self, off: f64) -> f64 {
+        self.tangential - self.both() * off * off - 2.0 * self.mixed * off
+    }
+
+    /// The greatest part by which such a u may leave the tangent plane, if that is not to be negative.
+    pub(super) fn most_off(&self) -> f64 {
+        let (tangential, both) = (self.tangential.max(0.0), self.both());
+        tangential / (self.mixed + (self.mixed * self.mixed + both * tangential).sqrt())
+    }
+
+    /// What is lost with the square of that part.
+    pub(super) fn both(&self) -> f64 {
+        self.tangential.max(0.0) - self.normal
     }
 }
 

@@ -97,6 +97,11 @@ impl Taylor {
         p.distance(self.onto) + self.reach + 8.0 * f64::EPSILON * size
     }
 
+    /// Half of what lies between two planes that hold the surface.
+    pub(super) fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
     /// The sign of the formula in the middle.
     pub(super) fn level(&self) -> f64 {
         self.value
@@ -160,6 +165,17 @@ impl Taylor {
             return (f64::NEG_INFINITY, self.center + start.clamp(local.min, local.max));
         };
         (bound(&foot), self.center + foot.point)
+    }
+
+    /// [`Taylor::least`] at once, where the surface is known to be nearest in `foot`, beside `cell`.
+    pub(super) fn beside(&self, p: DVec3, foot: DVec3, cell: &Aabb) -> f64 {
+        let local = Aabb::new(cell.min - self.center, cell.max - self.center);
+        self.tangent(p - self.center, foot.clamp(cell.min, cell.max) - self.center, (p - foot).dot(self.normal), &local)
+    }
+
+    /// The middle of the tangent plane nearest to `p`.
+    pub(super) fn onto(&self, p: DVec3) -> DVec3 {
+        p - self.normal * (self.normal.dot(p - self.center) + self.value)
     }
 
     /// No less than the distance of `p` to the surface by a point of the box, infinite where there may be none.
