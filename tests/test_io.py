@@ -91,6 +91,16 @@ def test_what_is_written_is_read_by_another_tool(tmp_path: Path, suffix: str) ->
     assert np.allclose(other.triangles, part.corners, rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize(("scale", "shift"), [(1e40, 0.0), (1e-50, 0.0), (1e-44, 0.0), (1.0, 1e7)])
+def test_an_stl_that_single_precision_would_spoil_is_refused(tmp_path: Path, scale: float, shift: float) -> None:
+    mesh = tf.TriangleMesh(blob().vertices * scale + shift, blob().triangles)
+    with pytest.raises(tf.FileError, match="single precision"):
+        mesh.write(tmp_path / "a.stl")
+    assert not list(tmp_path.iterdir())
+    mesh.write(tmp_path / "a.ply")
+    np.testing.assert_array_equal(tf.read(tmp_path / "a.ply").vertices, mesh.vertices)
+
+
 def test_text_stl_is_read_in_full_precision(tmp_path: Path) -> None:
     part = blob()
     again = tf.read(wrote(tmp_path / "blob.stl", stl_text(part)))

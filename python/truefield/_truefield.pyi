@@ -1,6 +1,6 @@
 """The compiled half of truefield."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Literal, final
 
 import numpy as np
@@ -525,7 +525,7 @@ def adaptive_field_levels(
 ) -> tuple[dict[str, Any], list[dict[str, NDArray[Any]]]]: ...
 def adaptive_field_from_levels(
     about: dict[str, Any],
-    levels: list[dict[str, NDArray[Any]]],
+    levels: Iterator[dict[str, NDArray[Any]]],
     surface: Surface | None,
     threads: int | None = None,
     progress: _Progress = None,

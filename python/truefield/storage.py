@@ -215,7 +215,8 @@ def _adaptive(header: Header, arrays: Arrays, threads: int | None, progress: Pro
     about = {name: header[name] for name in names} | {"growth": growth, "edits": arrays["edits"]}
     about["coverage"] = header.get("coverage", "unknown")
     read = sum(name.startswith("records_") for name in arrays)
-    levels = [{name: arrays[f"{name}_{number}"] for name in _LEVEL} for number in range(read)]
+    # Each level is let go when it was read: then no more is held than twice the field.
+    levels = ({name: arrays.pop(f"{name}_{number}") for name in _LEVEL} for number in range(read))
     return AdaptiveField(_truefield.adaptive_field_from_levels(about, levels, surface, threads, progress))
 
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1};
+use numpy::{Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyIterator, PyList};
 use truefield::build::adaptive::{Rules, coalesce};
 use truefield::field::adaptive::{
     Accuracy, AdaptiveField, Change, Coverage, Division, Edit, Edits, Level, LevelKind, Levels, ListSide, Lists, Record, Root,
@@ -141,13 +141,13 @@ pub fn levels_of<'py>(
     Ok((about, out))
 }
 
-/// The field that such dictionaries describe; what is deeper than the last level given was left out.
+/// The field that such dictionaries describe, each let go when it was read; what is deeper than the last was left out.
 #[pyfunction]
 #[pyo3(name = "adaptive_field_from_levels", signature = (about, levels, surface, threads=None, progress=None))]
 pub fn field_of_levels(
     py: Python<'_>,
     about: &Bound<'_, PyDict>,
-    levels: &Bound<'_, PyList>,
+    levels: &Bound<'_, PyIterator>,
     surface: Option<&PySurface>,
     threads: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
@@ -164,19 +164,18 @@ pub fn field_of_levels(
     };
     let mut all = Levels::new(root, continuity, accuracy);
     all.coverage = coverage(&said::<String>(about, "coverage")?)?;
-    let edits: Vec<f64> = array(about, "edits")?;
-    all.edits = Edits::new(edits.chunks(EDIT).map(read).collect::<truefield::Result<_>>().map_err(raise)?);
-    for level in levels.iter() {
+    let edits = array::<f64>(about, "edits")?;
+    all.edits = Edits::new(edits.as_slice()?.chunks(EDIT).map(read).collect::<truefield::Result<_>>().map_err(raise)?);
+    for level in levels {
+        let level = level?;
         let level = level.cast::<PyDict>().map_err(|_| damaged("a level is no dictionary"))?;
-        let records: Vec<f32> = array(level, "records")?;
-        let (records, rest) = records.as_chunks::<RECORD>();
-        let cubics: Vec<f32> = array(level, "cubics")?;
-        let (cubics, rest_of_cubics) = cubics.as_chunks::<64>();
+        let (records, cubics) = (array::<f32>(level, "records")?, array::<f32>(level, "cubics")?);
+        let (records, rest) = records.as_slice()?.as_chunks::<RECORD>();
+        let (cubics, rest_of_cubics) = cubics.as_slice()?.as_chunks::<64>();
         if !rest.is_empty() || !rest_of_cubics.is_empty() {
             return Err(damaged("a level has half a cell"));
         }
-        let kinds: Vec<u8> = array(level, "kinds")?;
-        let sides: Vec<u8> = array(level, "sides")?;
+        let (kinds, sides) = (array::<u8>(level, "kinds")?, array::<u8>(level, "sides")?);
         let kind = |&kind: &u8| match kind {
             0 => Ok(LevelKind::Branch),
             1 => Ok(LevelKind::Linear),
@@ -192,13 +191,13 @@ pub fn field_of_levels(
         };
         let record = |&[a, b, c, d, e, f, g, h, lower, upper]: &[f32; RECORD]| Record { corners: [a, b, c, d, e, f, g, h], lower, upper };
         all.levels.push(Level {
-            kinds: kinds.iter().map(kind).collect::<PyResult<_>>()?,
+            kinds: kinds.as_slice()?.iter().map(kind).collect::<PyResult<_>>()?,
             records: records.iter().map(record).collect(),
             cubics: cubics.to_vec(),
             lists: Lists {
-                ends: array(level, "ends")?,
-                sides: sides.iter().map(side).collect::<PyResult<_>>()?,
-                triangles: array(level, "triangles")?,
+                ends: array::<u32>(level, "ends")?.as_slice()?.to_vec(),
+                sides: sides.as_slice()?.iter().map(side).collect::<PyResult<_>>()?,
+                triangles: array::<u32>(level, "triangles")?.as_slice()?.to_vec(),
             },
         });
     }
@@ -250,11 +249,9 @@ fn said<'py, T: for<'a> FromPyObject<'a, 'py>>(about: &Bound<'py, PyDict>, name:
     value.extract().map_err(|_| damaged(&format!("{name} cannot be used")))
 }
 
-fn array<T: Element + Clone>(of: &Bound<'_, PyDict>, name: &str) -> PyResult<Vec<T>> {
-    let found: PyReadonlyArray1<'_, T> = of
-        .get_item(name)?
-        .and_then(|value| value.cast_into::<PyArray1<T>>().ok())
-        .map(|array| array.readonly())
-        .ok_or_else(|| damaged(&format!("{name} is no array of its kind")))?;
-    Ok(found.as_slice().map_err(|_| damaged(&format!("{name} is not contiguous")))?.to_vec())
+/// An array that is flat and without gaps.
+fn array<'py, T: Element>(of: &Bound<'py, PyDict>, name: &str) -> PyResult<PyReadonlyArray1<'py, T>> {
+    let found = of.get_item(name)?.and_then(|value| value.cast_into::<PyArray1<T>>().ok()).map(|array| array.readonly());
+    let found = found.ok_or_else(|| damaged(&format!("{name} is no array of its kind")))?;
+    if found.is_contiguous() { Ok(found) } else { Err(damaged(&format!("{name} is not contiguous"))) }
 }

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from truefield.errors import FileError
 from truefield.files import PathLike
 from truefield.formats import obj, off, ply, stl
+from truefield.formats.polygons import FormatError
 
 if TYPE_CHECKING:
     from truefield.formats.polygons import Soup
@@ -44,4 +45,7 @@ def check(path: PathLike) -> None:
 def encode(mesh: TriangleMesh, path: PathLike) -> bytes:
     """The content of a mesh file of the format that the suffix of `path` names."""
     check(path)
-    return _ENCODERS[Path(path).suffix.lower()](mesh)
+    try:
+        return _ENCODERS[Path(path).suffix.lower()](mesh)
+    except FormatError as error:
+        raise FileError(f"cannot write '{path}': {error}; write .ply, .obj or .off") from None

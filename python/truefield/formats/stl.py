@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
 
 _HEADER: Final = 84
+_CHUNK: Final = 1 << 16
+# Of the longest side: rounding that can be seen.
+_MOST_MOVED: Final = 1e-3
 _FACET: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -64,12 +67,23 @@ def _decode_text(data: bytes) -> np.ndarray[tuple[int, ...], np.dtype[np.float64
 
 
 def encode(mesh: TriangleMesh) -> bytes:
-    """Binary STL; coordinates are rounded to float32."""
-    corners = mesh.corners
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    facets = np.zeros(len(corners), dtype=_FACET)
-    facets["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-    facets["corners"] = corners
+    """Binary STL; coordinates are rounded to float32. Refuses meshes that rounding would spoil."""
+    facets = np.zeros(len(mesh.triangles), dtype=_FACET)
+    moved = 0.0
+    for start in range(0, len(facets), _CHUNK):
+        part = facets[start : start + _CHUNK]
+        corners = mesh.vertices[mesh.triangles[start : start + _CHUNK]]
+        # What single precision cannot hold is found below.
+        with np.errstate(all="ignore"):
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            length = np.linalg.norm(normals, axis=1, keepdims=True)
+            part["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+            part["corners"] = corners
+        moved = max(moved, float(np.abs(part["corners"] - corners).max()))
+    size = float(np.max(mesh.extent[1] - mesh.extent[0]))
+    if moved > _MOST_MOVED * size:
+        raise FormatError(
+            f"STL keeps single precision, which would move vertices by {moved:.3g} in a part of size {size:.3g}"
+        )
     title = f"truefield {mesh.name}".encode("ascii", "replace")[:80].ljust(80)
-    return title + len(facets).to_bytes(4, "little") + facets.tobytes()
+    return b"".join((title, len(facets).to_bytes(4, "little"), facets.data))
