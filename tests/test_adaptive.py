@@ -78,6 +78,10 @@ def test_exact_fields_need_no_tolerance_and_others_do(part: tf.TriangleMesh) -> 
         ({"method": "quartic"}, "method"),
         ({"rule": "hope"}, "rule"),
         ({"domain": ((1, 1, 1), (0, 0, 0))}, "domain"),
+        ({"domain": [[0, 0, 0]]}, "domain"),
+        ({"domain": "abc"}, "domain"),
+        ({"domain": (1, 2)}, "domain"),
+        ({"domain": ((0, 0, 0), (np.nan, 1, 1))}, "domain"),
         ({"threads": 0}, "threads"),
     ],
 )

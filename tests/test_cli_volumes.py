@@ -56,6 +56,8 @@ def test_a_part_becomes_samples_and_a_mesh_again(truefield: Command, folder: Pat
     part, mesh = tf.read(folder / "blob.ply"), tf.read(folder / "a.stl")
     assert mesh.check().watertight
     assert np.abs(tf.Surface(part).distance(mesh.vertices)).max() < 0.02
+    assert "border" not in said
+    assert "border" in truefield.done("surface", folder / "a.nrrd", "--distance", 9, "-o", folder / "c.ply")
     truefield.done("surface", folder / "a.nrrd", "--distance", 0.15, "--border", "open", "-o", folder / "b.ply")
     assert not tf.read(folder / "b.ply").check().watertight
 

@@ -1,8 +1,10 @@
 import threading
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 import truefield as tf
+from numpy.typing import NDArray
 from truefield import csg, implicit
 
 BOX = ((-1.5, -1.5, -1.5), (1.5, 1.5, 1.5))
@@ -172,3 +174,23 @@ def test_functions_are_asked_from_many_threads_without_a_deadlock() -> None:
     assert len(results) == 4
     for result in results:
         np.testing.assert_array_equal(result, distance_of_a_ball(p))
+
+
+def test_what_a_function_raises_is_heard_wherever_it_is_asked() -> None:
+    box = ((-2.0, -2.0, -2.0), (2.0, 2.0, 2.0))
+
+    def fails(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        raise ZeroDivisionError(len(points))
+
+    def says(answer: Callable[[int], NDArray[np.float64]]) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+        return lambda points: answer(len(points))
+
+    for compute in (fails, says(lambda n: np.full(n, np.nan)), says(lambda n: np.zeros((n, 1)))):
+        shape = implicit.function(compute, lipschitz=1.0, domain=box)
+        for one in (shape, shape - csg.sphere(0.5)):
+            points = [(1.0, 1.0, 1.0), (0.1, 0.2, 0.3)]
+            for ask in (one.distance, one.bounds, one.gradient):
+                with pytest.raises(tf.TruefieldError, match="the function"):
+                    ask(points)
+            with pytest.raises(tf.TruefieldError, match="the function"):
+                tf.collide(one, csg.sphere(1.0))

@@ -159,3 +159,11 @@ def test_points_are_taken_as_they_are_or_refused() -> None:
     for wrong in (points + 1j, dates, np.ma.masked_array(points, points > 5.0), "abc", None):
         with pytest.raises(tf.TruefieldError, match="points"):
             surface.distance(wrong)  # type: ignore[arg-type]
+    for threads in (0, -1, 1.5, "all", 2**70):
+        with pytest.raises(tf.TruefieldError, match="threads"):
+            surface.distance(points, threads=threads)  # type: ignore[arg-type]
+    assert len(tf.complete_field(surface, 4, memory=2**70).distance(points)) == 20
+    cube = tf.shapes.cube()
+    for vertices in (cube.vertices + 1j, np.ma.masked_array(cube.vertices, cube.vertices > 1.0)):
+        with pytest.raises(tf.TruefieldError, match="vertices"):
+            tf.TriangleMesh(vertices, cube.triangles)

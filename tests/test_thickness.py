@@ -195,6 +195,17 @@ def test_bad_arguments_are_one_clear_sentence(options: dict[str, Any], word: str
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize("tolerance", [1.0, 2.6, 4.0, 10.0, 1e6, 1e300])
+def test_a_tolerance_wider_than_the_part_is_deep_is_still_answered(tolerance: float) -> None:
+    report = tf.thickness(tf.shapes.cube(5.0), tolerance=tolerance, above=1.0)
+    depth = report.greatest_depth.depth
+    assert depth.lower <= 2.5 <= depth.upper
+    assert depth.upper - depth.lower <= tolerance
+    (section,) = report.heavy_sections
+    assert section.depth.lower <= 2.5 <= section.depth.upper
+    assert section.volume.lower <= 64.0 <= section.volume.upper
+
+
 def test_what_has_no_inside_is_refused() -> None:
     box = tf.shapes.box((3.0, 2.0, 1.0))
     with pytest.raises(tf.TruefieldError, match="no inside"):

@@ -451,10 +451,7 @@ def adaptive_field(
         TruefieldError: an argument cannot be used, or the shape has no end and no domain is given.
         MemoryError: the tree would not fit.
     """
-    box = None
-    if domain is not None:
-        low, high = (arguments.points(corner)[0].tolist() for corner in domain)
-        box = (low, high)
+    box = None if domain is None else arguments.box("domain", domain)
     deepest = _DEEPEST if max_depth is None else arguments.count("max_depth", max_depth, least=0)
     surface = Surface(part, threads=threads, progress=progress) if isinstance(part, TriangleMesh) else part
     if tolerance is None:

@@ -14,16 +14,13 @@ Floats = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 _MOST_CELLS_ALONG_A_SIDE = 2**31
+_MOST_BYTES = 2**63
 
 
 def points(points: ArrayLike) -> Floats:
     """(n, 3) float64, C-contiguous and aligned; a single point may be given as (3,)."""
     try:
-        given = np.asarray(points)
-        # A cast would drop imaginary parts, take dates for numbers and masked places for known ones.
-        if given.dtype.kind in "cmM" or np.ma.is_masked(points):
-            raise TypeError
-        array = np.require(given, np.float64, ["C", "A"])
+        array = real(points)
     except (TypeError, ValueError):
         raise TruefieldError("points are not numbers; give an array of shape (n, 3)") from None
     if array.ndim == 1 and array.shape[0] == 3:
@@ -31,6 +28,33 @@ def points(points: ArrayLike) -> Floats:
     if array.ndim != 2 or array.shape[1] != 3:
         raise TruefieldError(f"points have shape {array.shape}; give an array of shape (n, 3)")
     return array
+
+
+def real(values: ArrayLike) -> Floats:
+    """Float64, C-contiguous and aligned; raises TypeError or ValueError where values are no real numbers.
+
+    A cast would drop imaginary parts, take dates for numbers and masked places for known ones.
+    """
+    given = np.asarray(values)
+    if given.dtype.kind in "cmM" or np.ma.is_masked(values):
+        raise TypeError
+    array: Floats = np.require(given, np.float64, ["C", "A"])
+    return array
+
+
+def box(name: str, corners: tuple[ArrayLike, ArrayLike]) -> tuple[list[float], list[float]]:
+    """The lowest and the highest corner of a box, as they are given."""
+    try:
+        array = real([real(corner) for corner in corners])
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (2, 3):
+        said = " ".join(repr(corners).split())
+        raise TruefieldError(
+            f"{name} is {said:.80}; give the lowest and the highest corner of a box, ((x, y, z), (x, y, z))"
+        )
+    low, high = array.tolist()
+    return low, high
 
 
 def count(name: str, value: int, least: int) -> int:
@@ -89,7 +113,7 @@ def lattice(
 def memory(memory: int | None) -> int:
     """Bytes that a job may take; half the machine's memory by default."""
     if memory is not None:
-        return count("memory", memory, least=0)
+        return min(count("memory", memory, least=0), _MOST_BYTES)
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
     except (AttributeError, ValueError, OSError):

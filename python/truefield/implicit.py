@@ -234,7 +234,7 @@ def field(
         raise TruefieldError(f"the expression is {expression!r}; make one from implicit.axes()")
     if domain is None:
         raise TruefieldError("a formula may have surface anywhere; give a domain, the two corners of a box")
-    low, high = _box(domain)
+    low, high = arguments.box("domain", domain)
     native = expression._native.shape(low, high, threads, progress)
     return Shape(native, f"implicit.field(..., domain=({_corner(low)}, {_corner(high)}))")
 
@@ -267,7 +267,7 @@ def function(
     native = _truefield.function_shape(
         compute,
         arguments.length("lipschitz", lipschitz),
-        None if domain is None else _box(domain),
+        None if domain is None else arguments.box("domain", domain),
         values,
     )
     return Shape(native, f"implicit.function({getattr(compute, '__name__', 'compute')}, lipschitz={lipschitz:g})")
@@ -287,19 +287,6 @@ def _unary(name: str, of: Expression | Number) -> Expression:
 
 def _binary(name: str, a: Expression | Number, b: Expression | Number) -> Expression:
     return Expression(_expression(a)._native.binary(name, _expression(b)._native))
-
-
-def _box(domain: Box) -> tuple[list[float], list[float]]:
-    try:
-        corners = np.asarray(domain, dtype=np.float64)
-    except (TypeError, ValueError):
-        corners = np.empty(0)
-    if corners.shape != (2, 3):
-        raise TruefieldError(
-            f"domain is {domain!r}; give the lowest and the highest corner of a box, ((x, y, z), (x, y, z))"
-        )
-    low, high = corners.tolist()
-    return low, high
 
 
 def _corner(corner: Sequence[float]) -> str:

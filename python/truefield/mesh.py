@@ -8,7 +8,7 @@ from typing import Final, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truefield import _truefield
+from truefield import _truefield, arguments
 from truefield.check import MeshCheck
 from truefield.errors import TruefieldError
 from truefield.files import PathLike, replacing
@@ -128,11 +128,9 @@ class TriangleMesh:
 
 def _points(vertices: ArrayLike) -> Array:
     try:
-        points = np.array(vertices, dtype=np.float64, order="C", copy=True)
-    except (TypeError, ValueError) as error:
-        raise TruefieldError(
-            f"vertices cannot be turned into numbers ({error}); give an array of shape (n, 3)"
-        ) from None
+        points: Array = arguments.real(vertices).copy()
+    except (TypeError, ValueError):
+        raise TruefieldError("vertices cannot be turned into numbers; give an array of shape (n, 3)") from None
     if points.ndim != 2 or points.shape[1] != 3:
         raise TruefieldError(f"vertices has shape {points.shape}; give an array of shape (n, 3)")
     if len(points) == 0:

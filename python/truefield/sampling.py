@@ -179,10 +179,7 @@ def _surface(part: Source, sign: Sign, threads: int | None, progress: Progress |
 
 
 def _box(extent: tuple[ArrayLike, ArrayLike]) -> tuple[Floats, Floats]:
-    try:
-        low, high = np.asarray(extent, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise TruefieldError(f"extent is {extent!r}; give the lowest and the highest corner of a box") from None
-    if low.shape != (3,) or not (np.all(np.isfinite(low)) and np.all(np.isfinite(high)) and np.all(low <= high)):
+    low, high = (np.array(corner) for corner in arguments.box("extent", extent))
+    if not (np.all(np.isfinite(low)) and np.all(np.isfinite(high)) and np.all(low <= high)):
         raise TruefieldError(f"extent is {extent!r}; give the lowest and the highest corner of a box")
     return low, high

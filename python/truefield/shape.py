@@ -104,8 +104,9 @@ class Shape:
     def scale(self, factor: float) -> Shape:
         """The shape scaled about the origin by a positive factor, the same along all axes, as distances need it."""
         k = arguments.number("factor", factor)
+        native = self._native.scale(k)
         ball = None if self._ball is None else (self._ball[0] * k, self._ball[1] * k)
-        return Shape(self._native.scale(k), f"{self._text}.scale({k:g})", ball=ball)
+        return Shape(native, f"{self._text}.scale({k:g})", ball=ball)
 
     def offset(self, distance: float) -> Shape:
         """All points within a distance of the shape; with a negative one, all points so deep in it.

@@ -11,7 +11,7 @@ use truefield::product::raycast::Caster;
 use truefield::{Aabb, Error, Run};
 
 use crate::convert::{column, points, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::shape::PyShape;
 use crate::surface::{PySurface, interval_arrays, sign_name};
 
@@ -93,7 +93,7 @@ impl PyAdaptiveField {
         method: &str,
         rule: &str,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let rules = Rules { tolerance, growth, max_depth, rule: self::rule(rule)?, reconstruction: reconstruction(method)?, memory };
@@ -118,7 +118,7 @@ impl PyAdaptiveField {
         method: &str,
         rule: &str,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let rules = Rules { tolerance, growth, max_depth, rule: self::rule(rule)?, reconstruction: Reconstruction::Linear, memory };
@@ -194,7 +194,7 @@ impl PyAdaptiveField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Floats<'py>> {
         let points = self::points(&points)?;
@@ -206,7 +206,7 @@ impl PyAdaptiveField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Floats<'py>, Floats<'py>)> {
         let points = self::points(&points)?;
@@ -218,7 +218,7 @@ impl PyAdaptiveField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = self::points(&points)?;

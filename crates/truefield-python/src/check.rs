@@ -6,7 +6,7 @@ use pyo3::types::PyDict;
 use truefield::{Check, Found};
 
 use crate::convert::mesh;
-use crate::door::job;
+use crate::door::{Threads, job};
 
 /// A count and the first few finds, each a tuple of indices.
 fn found<const N: usize, T: Copy>(finds: &Found<T>, indices: impl Fn(T) -> [u32; N]) -> (usize, Vec<Vec<u32>>) {
@@ -20,7 +20,7 @@ pub fn check_mesh<'py>(
     py: Python<'py>,
     vertices: PyReadonlyArray2<'py, f64>,
     triangles: PyReadonlyArray2<'py, i64>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let mesh = mesh(&vertices, &triangles)?;

@@ -6,7 +6,7 @@ use truefield::Error;
 use truefield::product::contour::{Placement, contour};
 
 use crate::convert::{column, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::surface::PySurface;
 
 type Points<'py> = Bound<'py, PyArray2<f64>>;
@@ -30,7 +30,7 @@ pub fn contour_of<'py>(
     tolerance: f64,
     placement: &str,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Points<'py>, Points<'py>, Bound<'py, PyArray1<i64>>)> {
     let placement = self::placement(placement)?;

@@ -8,7 +8,7 @@ use truefield::source::csg::{self, Exact, Placement};
 use truefield::{DVec3, Result, Source};
 
 use crate::convert::points;
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::shape::PyShape;
 
 #[pyfunction]
@@ -60,19 +60,19 @@ pub fn molecule(centers: PyReadonlyArray2<'_, f64>, radii: PyReadonlyArray1<'_, 
 #[pyfunction]
 pub fn union_of(py: Python<'_>, shapes: Vec<PyRef<'_, PyShape>>) -> PyResult<PyShape> {
     let shapes = sources(&shapes);
-    job(py, Some(1), None, |_| csg::Union::new(shapes)).map(PyShape::of)
+    job(py, Some(Threads::ONE), None, |_| csg::Union::new(shapes)).map(PyShape::of)
 }
 
 #[pyfunction]
 pub fn intersection_of(py: Python<'_>, shapes: Vec<PyRef<'_, PyShape>>) -> PyResult<PyShape> {
     let shapes = sources(&shapes);
-    job(py, Some(1), None, |_| csg::intersection(&shapes)).map(PyShape::of)
+    job(py, Some(Threads::ONE), None, |_| csg::intersection(&shapes)).map(PyShape::of)
 }
 
 #[pyfunction]
 pub fn difference_of(py: Python<'_>, shape: &PyShape, others: Vec<PyRef<'_, PyShape>>) -> PyResult<PyShape> {
     let others = sources(&others);
-    job(py, Some(1), None, |_| csg::difference(&shape.0, &others)).map(PyShape::of)
+    job(py, Some(Threads::ONE), None, |_| csg::difference(&shape.0, &others)).map(PyShape::of)
 }
 
 #[pyfunction]

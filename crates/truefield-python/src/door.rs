@@ -33,6 +33,28 @@ pub fn raise(error: Error) -> PyErr {
     }
 }
 
+/// How many threads a job may use.
+#[derive(Clone, Copy, Debug)]
+pub struct Threads(usize);
+
+impl Threads {
+    pub const ONE: Self = Self(1);
+}
+
+impl<'py> FromPyObject<'_, 'py> for Threads {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match given.extract() {
+            Ok(count) if count > 0 => Ok(Self(count)),
+            _ => {
+                let said = given.repr()?;
+                Err(python::TruefieldError::new_err(format!("threads is {said}; give a whole number of at least 1, or None for all cores")))
+            }
+        }
+    }
+}
+
 /// The latest report of a job.
 struct Latest(Mutex<Option<(&'static str, usize, usize)>>);
 
@@ -47,16 +69,13 @@ impl Progress for Latest {
 /// `progress` is called as `progress(phase, fraction)`; an exception it raises, like Ctrl-C, ends the job.
 pub fn job<T: Send>(
     py: Python<'_>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Run<'_>) -> truefield::Result<T> + Send,
 ) -> PyResult<T> {
-    if threads == Some(0) {
-        return Err(python::TruefieldError::new_err("threads must be at least 1, or None for all cores, not 0"));
-    }
     let progress = progress.filter(|p| !p.is_none()).map(|p| p.clone().unbind());
     let (cancel, latest) = (Cancel::new(), Latest(Mutex::new(None)));
-    let run = Run { threads: threads.unwrap_or(Run::default().threads), cancel: &cancel, progress: &latest };
+    let run = Run { threads: threads.map_or(Run::default().threads, |Threads(count)| count), cancel: &cancel, progress: &latest };
     let mut interrupted: PyResult<()> = Ok(());
     let result = py.detach(|| {
         std::thread::scope(|scope| {

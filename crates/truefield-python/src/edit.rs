@@ -15,7 +15,7 @@ use truefield::source::polygon::{Fill, Polygon};
 use truefield::{Aabb, Continuity, DVec3, Error};
 
 use crate::adaptive::PyAdaptiveField;
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::sampled::PySampledField;
 use crate::shape::PyShape;
 use crate::surface::PySurface;
@@ -36,7 +36,7 @@ pub fn edit_field(
     operation: &str,
     radius: f64,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyAdaptiveField> {
     let operation = match operation {
@@ -63,7 +63,7 @@ pub fn less_detail(
     field: &PyAdaptiveField,
     tolerance: Option<f64>,
     depth: Option<u32>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyAdaptiveField> {
     let detail = match (tolerance, depth) {
@@ -85,7 +85,7 @@ pub fn merged_samples(
     growth: f64,
     max_depth: u32,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyAdaptiveField> {
     let rules = Rules { growth, max_depth, memory, ..Rules::within(tolerance) };
@@ -110,7 +110,7 @@ pub fn polygon(loops: Vec<Vec<[f64; 2]>>, fill: &str) -> PyResult<PyShape> {
 pub fn levels_of<'py>(
     py: Python<'py>,
     field: &PyAdaptiveField,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyList>)> {
     let inner = &field.field;
@@ -149,7 +149,7 @@ pub fn field_of_levels(
     about: &Bound<'_, PyDict>,
     levels: &Bound<'_, PyIterator>,
     surface: Option<&PySurface>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyAdaptiveField> {
     let [min, max]: [[f64; 3]; 2] = said(about, "extent")?;

@@ -10,7 +10,7 @@ use truefield::field::complete::Region;
 use truefield::{CompleteField, DVec3, Error, Grid};
 
 use crate::convert::column;
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::surface::{NearestArrays, PySurface, interval_arrays, nearest_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
@@ -40,7 +40,7 @@ impl PyCompleteField {
         shape: [u32; 3],
         region: &str,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let grid = Grid { origin: DVec3::from_array(origin), spacing: cell_size, first: [0; 3], shape };
@@ -100,7 +100,7 @@ impl PyCompleteField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Floats<'py>> {
         let points = crate::convert::points(&points)?;
@@ -112,7 +112,7 @@ impl PyCompleteField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Floats<'py>, Floats<'py>)> {
         let points = crate::convert::points(&points)?;
@@ -124,7 +124,7 @@ impl PyCompleteField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<NearestArrays<'py>> {
         let points = crate::convert::points(&points)?;

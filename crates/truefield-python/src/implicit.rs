@@ -9,7 +9,7 @@ use truefield::source::implicit::{Binary, Expression, Implicit, Tape, Unary};
 use truefield::{Aabb, DVec3, Error};
 
 use crate::convert::{column, points, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::shape::PyShape;
 
 /// A formula of x, y and z; see `truefield.implicit.Expression`.
@@ -79,7 +79,7 @@ impl PyExpression {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self::points(&points)?;
@@ -94,7 +94,7 @@ impl PyExpression {
         py: Python<'_>,
         low: [f64; 3],
         high: [f64; 3],
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyShape> {
         let domain = Aabb::new(DVec3::from_array(low), DVec3::from_array(high));

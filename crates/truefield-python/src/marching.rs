@@ -11,7 +11,7 @@ use truefield::build::wavefront::wavefront;
 use truefield::{DVec3, Error, Grid};
 
 use crate::convert::column;
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::sampled::PySampledField;
 use crate::surface::PySurface;
 
@@ -32,7 +32,7 @@ pub fn voxels_of<'py>(
     shape: [u32; 3],
     rule: &str,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<VoxelArrays<'py>> {
     let rule = match rule {
@@ -67,7 +67,7 @@ pub fn marched_samples_of(
     shape: [u32; 3],
     band: Option<f64>,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PySampledField> {
     let lattice = Grid { origin: DVec3::from_array(origin), spacing, first: [0; 3], shape };
@@ -87,7 +87,7 @@ pub fn wavefront_from<'py>(
     shape: Vec<usize>,
     sampling: Vec<f64>,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Sites<'py>, Singles<'py>, Bound<'py, PyArray1<u64>>)> {
     let marks = flat(&sites)?;
@@ -107,7 +107,7 @@ pub fn march_from<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Sites<'py>, Singles<'py>)> {
     let marks = flat(&sites)?;
-    let found = job(py, Some(1), progress, |run| march_sites(&shape, &sampling, marks, f64::INFINITY, memory, run))?;
+    let found = job(py, Some(Threads::ONE), progress, |run| march_sites(&shape, &sampling, marks, f64::INFINITY, memory, run))?;
     Ok((found.points.into_pyarray(py), found.distance.into_pyarray(py)))
 }
 
@@ -120,7 +120,7 @@ pub fn site_difference_of<'py>(
     exact: PyReadonlyArray1<'py, u32>,
     shape: Vec<usize>,
     sampling: Vec<f64>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(u64, f64)> {
     let (marched, exact) = (flat(&marched)?, flat(&exact)?);

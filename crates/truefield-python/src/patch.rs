@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use truefield::source::patch::{Bezier, Patches, Sides};
 use truefield::{DVec3, Error};
 
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::shape::PyShape;
 
 /// (n, 4, 4, 3) control points as a shape; `sides` is "closed" or "unsigned".
@@ -15,7 +15,7 @@ pub fn patch_shape(
     py: Python<'_>,
     controls: PyReadonlyArray4<'_, f64>,
     sides: &str,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyShape> {
     let sides = match sides {

@@ -13,7 +13,7 @@ use truefield::{Aabb, Distance, Error};
 
 use crate::adaptive::PyAdaptiveField;
 use crate::convert::{column, flat_rows, points, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::render::{PyCamera, samples};
 use crate::shape::PyShape;
 
@@ -39,7 +39,7 @@ pub fn cast_rays<'py>(
     directions: PyReadonlyArray2<'py, f64>,
     method: &str,
     distance: f64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Floats<'py>, Rows<'py>, Rows<'py>)> {
     let (origins, directions, method) = (points(&origins)?, points(&directions)?, self::method(method)?);
@@ -58,7 +58,7 @@ pub fn occluded_rays<'py>(
     length: f64,
     method: &str,
     distance: f64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<bool>>> {
     let (origins, directions, method) = (points(&origins)?, points(&directions)?, self::method(method)?);
@@ -75,7 +75,7 @@ pub fn adaptive_nearest<'py>(
     py: Python<'py>,
     field: &PyAdaptiveField,
     points: PyReadonlyArray2<'py, f64>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Places<'py>> {
     let points = self::points(&points)?;
@@ -96,7 +96,7 @@ pub fn adaptive_surface<'py>(
     distance: f64,
     shape: Option<&PyShape>,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<MeshArrays<'py>> {
     let shape = shape.map(|shape| Arc::clone(&shape.0));
@@ -127,11 +127,18 @@ pub fn collide_solids(
     second: &Bound<'_, PyAny>,
     tolerance: f64,
     budget: usize,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Found> {
     let (f, g) = (solid(first)?, solid(second)?);
-    let found = job(py, threads, progress, |run| collide(&*f, &*g, tolerance, budget, run))?;
+    let shapes: Vec<_> = [first, second].iter().filter_map(|given| Some(Arc::clone(&given.cast::<PyShape>().ok()?.get().0))).collect();
+    let found = job(py, threads, progress, |run| {
+        let found = collide(&*f, &*g, tolerance, budget, run)?;
+        // A shape that failed answers that nothing is known; its values say what it failed with.
+        let mut values = [0.0; 2];
+        shapes.iter().try_for_each(|shape| shape.values(&[found.first, found.second], &mut values))?;
+        Ok(found)
+    })?;
     let state = match found.contact {
         Contact::Separated => "separated",
         Contact::Penetrating => "penetrating",
@@ -147,7 +154,7 @@ pub fn field_outline<'py>(
     py: Python<'py>,
     field: &PyAdaptiveField,
     distance: f64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Rows<'py>> {
     rows(py, job(py, threads, progress, |run| field.caster(distance, run)?.outline(run))?.into_iter())
@@ -169,7 +176,7 @@ pub fn draw_field<'py>(
     samples: u32,
     background: Option<(u8, u8, u8)>,
     occlusion: f64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Drawn<'py>> {
     let background = background.map_or(Background::Transparent, |(r, g, b)| Background::Colour([r, g, b]));

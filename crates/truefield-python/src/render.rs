@@ -9,7 +9,7 @@ use truefield::product::render::{
 use truefield::{Aabb, Error, Result};
 
 use crate::convert::{mesh, points as vectors};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 
 fn colours(array: &PyReadonlyArray2<'_, u8>) -> Result<Vec<Rgb>> {
     let view = array.as_array();
@@ -259,7 +259,7 @@ impl PyScene {
         samples: u32,
         background: Option<(u8, u8, u8)>,
         occlusion: f64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Drawn<'py>> {
         let samples = self::samples(samples)?;

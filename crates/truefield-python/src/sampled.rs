@@ -15,7 +15,7 @@ use truefield::product::surface::{Border, Triangulation, triangulate};
 use truefield::{Continuity, DVec3, Error, Grid, Known, Lattice, Run, SampledField};
 
 use crate::convert::{column, points, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::surface::{PySurface, interval_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
@@ -38,7 +38,7 @@ pub fn sample_of(
     shape: [u32; 3],
     band: Option<f64>,
     memory: u64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PySampledField> {
     let lattice = Grid { origin: DVec3::from_array(origin), spacing, first: [0; 3], shape };
@@ -57,7 +57,7 @@ impl PySampledField {
     fn derived(
         &self,
         py: Python<'_>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
         work: impl FnOnce(&SampledField, &Run<'_>) -> truefield::Result<SampledField> + Send,
     ) -> PyResult<Self> {
@@ -153,7 +153,7 @@ impl PySampledField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Floats<'py>> {
         let points = self::points(&points)?;
@@ -165,7 +165,7 @@ impl PySampledField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Floats<'py>, Floats<'py>)> {
         let points = self::points(&points)?;
@@ -177,7 +177,7 @@ impl PySampledField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Points<'py>> {
         let points = self::points(&points)?;
@@ -189,7 +189,7 @@ impl PySampledField {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Points<'py>> {
         let points = self::points(&points)?;
@@ -197,7 +197,7 @@ impl PySampledField {
     }
 
     fn complement(&self, py: Python<'_>) -> PyResult<Self> {
-        self.derived(py, Some(1), None, |field, _| complement(field))
+        self.derived(py, Some(Threads::ONE), None, |field, _| complement(field))
     }
 
     #[pyo3(signature = (distance, memory, threads=None, progress=None))]
@@ -206,7 +206,7 @@ impl PySampledField {
         py: Python<'_>,
         distance: f64,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         self.derived(py, threads, progress, |field, run| offset(field, distance, memory, run))
@@ -220,7 +220,7 @@ impl PySampledField {
         name: &str,
         other: &Self,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let operation = match name {
@@ -244,7 +244,7 @@ impl PySampledField {
         distance: f64,
         border: &str,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<MeshArrays<'py>> {
         let border = match border {
@@ -269,7 +269,7 @@ impl PySampledField {
         tolerance: f64,
         placement: &str,
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Points<'py>, Points<'py>, Floats<'py>, Floats<'py>)> {
         let placement = crate::contour::placement(placement)?;
@@ -285,7 +285,7 @@ impl PySampledField {
         py: Python<'py>,
         side: &str,
         angle: f64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Points<'py>, Floats<'py>, Floats<'py>)> {
         let side = match side {
@@ -305,7 +305,7 @@ impl PySampledField {
         spacing: [f64; 3],
         shape: [u32; 3],
         memory: u64,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let lattice = Lattice { origin: DVec3::from_array(origin), spacing: DVec3::from_array(spacing), first: [0; 3], shape };

@@ -10,7 +10,7 @@ use truefield::{DVec3, Error, Source, source};
 
 use crate::adaptive::PyAdaptiveField;
 use crate::convert::{column, points, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::surface::{PySurface, interval_arrays};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
@@ -90,7 +90,7 @@ impl PyShape {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Floats<'py>> {
         let points = self::points(&points)?;
@@ -102,7 +102,7 @@ impl PyShape {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<(Floats<'py>, Floats<'py>)> {
         let points = self::points(&points)?;
@@ -114,7 +114,7 @@ impl PyShape {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let points = self::points(&points)?;

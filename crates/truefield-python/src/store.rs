@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truefield::{CompleteField, DVec3, Error, Grid, Parts};
 
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 use crate::field::{PyCompleteField, region};
 use crate::surface::PySurface;
 
@@ -18,7 +18,7 @@ use crate::surface::PySurface;
 pub fn parts_of<'py>(
     py: Python<'py>,
     field: &PyCompleteField,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let parts = job(py, threads, progress, |run| field.0.to_parts(run))?;
@@ -46,7 +46,7 @@ pub fn field_of(
     shape: [u32; 3],
     region: &str,
     parts: &Bound<'_, PyDict>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<PyCompleteField> {
     let grid = Grid { origin: DVec3::from_array(origin), spacing: cell_size, first, shape };

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use truefield::{Error, Interval, Nearest, SignChoice, SignKind, Surface};
 
 use crate::convert::{column, mesh, points, rows};
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 
 type Floats<'py> = Bound<'py, PyArray1<f64>>;
 
@@ -50,7 +50,7 @@ impl PySurface {
         vertices: PyReadonlyArray2<'_, f64>,
         triangles: PyReadonlyArray2<'_, i64>,
         sign: &str,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let (mesh, sign) = (Arc::new(mesh(&vertices, &triangles)?), sign_choice(sign)?);
@@ -69,7 +69,7 @@ impl PySurface {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Floats<'py>> {
         let points = self::points(&points)?;
@@ -81,7 +81,7 @@ impl PySurface {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<(Floats<'py>, Floats<'py>)> {
         let points = self::points(&points)?;
@@ -93,7 +93,7 @@ impl PySurface {
         &self,
         py: Python<'py>,
         points: PyReadonlyArray2<'py, f64>,
-        threads: Option<usize>,
+        threads: Option<Threads>,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<NearestArrays<'py>> {
         let points = self::points(&points)?;

@@ -7,7 +7,7 @@ use truefield::product::thickness::{Across, Extreme, HeavySection, Kind, Options
 use truefield::{DVec3, product};
 
 use crate::convert::{column, points, rows};
-use crate::door::job;
+use crate::door::{Threads, job};
 use crate::surface::PySurface;
 
 type Point = (f64, f64, f64);
@@ -29,7 +29,7 @@ pub fn thickness<'py>(
     above: Option<f64>,
     below: Option<f64>,
     spacing: Option<f64>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let options = Options { tolerance, above, below, spacing };
@@ -53,7 +53,7 @@ pub fn walls_at<'py>(
     triangles: PyReadonlyArray1<'py, i64>,
     tolerance: f64,
     largest: f64,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<WallArrays<'py>> {
     let triangles = triangles.as_array();

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use truefield::build::transform::{Border, Image, Measure, Skewed, Target, Transform, indices};
 use truefield::{DVec3, Error, Result};
 
-use crate::door::{job, raise};
+use crate::door::{Threads, job, raise};
 
 /// The voxels, of any type that the core reads as it is.
 #[derive(FromPyObject)]
@@ -118,7 +118,7 @@ pub fn distance_transform<'py>(
     asked: Asked,
     mut out: PyReadwriteArray1<'py, f32>,
     sites: Option<Sites<'py>>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<()> {
     let ask = transform(image.image()?, &asked).map_err(raise)?;
@@ -135,7 +135,7 @@ pub fn transform_bounds<'py>(
     asked: Asked,
     mut lower: PyReadwriteArray1<'py, f32>,
     mut upper: PyReadwriteArray1<'py, f32>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<()> {
     let ask = transform(image.image()?, &asked).map_err(raise)?;
@@ -152,7 +152,7 @@ pub fn skewed_transform<'py>(
     asked: AskedSkewed,
     mut out: PyReadwriteArray1<'py, f32>,
     sites: Option<Sites<'py>>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<()> {
     let steps: Vec<_> = asked.1.iter().copied().map(DVec3::from_array).collect();
@@ -176,7 +176,7 @@ pub fn skewed_bounds<'py>(
     centres: PyReadonlyArray1<'py, f32>,
     mut lower: PyReadwriteArray1<'py, f32>,
     mut upper: PyReadwriteArray1<'py, f32>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<()> {
     let steps: Vec<_> = asked.1.iter().copied().map(DVec3::from_array).collect();
@@ -194,7 +194,7 @@ pub fn site_indices<'py>(
     sites: Sites<'py>,
     shape: Vec<usize>,
     out: Indices<'py>,
-    threads: Option<usize>,
+    threads: Option<Threads>,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<()> {
     match (sites, out) {

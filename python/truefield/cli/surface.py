@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from truefield.cli.options import FIELD_SUFFIX, Threads
 from truefield.cli.progress import progress
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 class Border(str, Enum):
@@ -67,3 +71,11 @@ def surface(
             raise tf.TruefieldError(f"'{volume}' is a complete field; it keeps the mesh itself")
     mesh.write(output)
     typer.echo(f"{output}: {len(mesh.triangles)} triangles at distance {distance:g}, {len(mesh.vertices)} vertices")
+    if isinstance(field, tf.SampledField) and _is_cut(field.values, distance):
+        typer.echo("it reaches the border of the samples and ends there; sample with a larger --margin to see more")
+
+
+def _is_cut(values: NDArray[np.float32], distance: float) -> bool:
+    """Whether some sample of the border is inside."""
+    ends = (values[[0, -1]], values[:, [0, -1]], values[:, :, [0, -1]])
+    return any(bool((end < distance).any()) for end in ends)

@@ -113,7 +113,7 @@ fn lattice(surface: &Surface, distance: f64, tolerance: f64) -> Result<Grid> {
     let least = (reach * 1e-13).max(grown.size().max_element() / 2e9);
     if spacing < least {
         return Err(Error::invalid(format!(
-            "a tolerance of {tolerance:?} is far below what rounding allows for coordinates up to {reach}; use at least {:.1e}",
+            "a tolerance of {tolerance:?} is far below what rounding allows for coordinates up to {reach:e}; use at least {:.1e}",
             least * 2.0
         )));
     }

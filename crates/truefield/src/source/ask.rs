@@ -15,11 +15,14 @@ pub fn values(source: &dyn Source, points: &[DVec3], run: &Run<'_>) -> Result<Ve
     each(points, run, 0.0, |points, out| source.values(points, out))
 }
 
-/// [`crate::distance::Distance::at`] on all threads.
+/// [`crate::distance::Distance::at`] on all threads. Fails where the shape cannot be asked.
 pub fn bounds(source: &dyn Source, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Interval>> {
     each(points, run, Interval::ALL, |points, out| {
         source.at_many(points, out);
-        Ok(())
+        // Where nothing is known, it may be because the shape failed: its values say so.
+        let open: Vec<DVec3> =
+            points.iter().zip(&*out).filter(|(_, known)| !(known.lower.is_finite() && known.upper.is_finite())).map(|(&p, _)| p).collect();
+        if open.is_empty() { Ok(()) } else { source.values(&open, &mut vec![0.0; open.len()]) }
     })
 }
 

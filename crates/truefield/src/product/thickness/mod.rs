@@ -29,6 +29,9 @@ use crate::run::Run;
 use crate::source::mesh::{SignKind, Surface};
 
 /// Samples a worker measures in one go: some milliseconds of work.
+/// Of the diagonal of a part: a tolerance that tells whether it has an inside.
+const FINE: f64 = 1e-3;
+
 const CHUNK: usize = 256;
 
 /// What to find out about a part. Lengths in model units; limits are limits on wall thickness.
@@ -174,13 +177,22 @@ pub fn heavy_sections(surface: &Surface, above: f64, tolerance: f64, run: &Run<'
 }
 
 fn deepest_place(surface: &Surface, octree: &Octree<'_>, tolerance: f64, run: &Run<'_>) -> Result<Deepest> {
-    // The surface itself has depth 0.
-    let root = Region { seeds: vec![(Cell::ROOT, f64::INFINITY)], best: 0.0, place: surface.mesh().corners(0)[0] };
-    let found = deepest(octree, vec![root], tolerance, f64::NEG_INFINITY, "greatest depth", run)?;
-    match found.first() {
-        Some(deepest) if deepest.depth.lower > 0.0 => Ok(*deepest),
-        _ => Err(no_inside(surface)),
+    // A tolerance as wide as the part is deep is kept before any place inside was seen: then it has to be a finer one.
+    let fine = FINE * surface.mesh().extent().diagonal();
+    for tolerance in [tolerance, fine.min(tolerance)] {
+        // The surface itself has depth 0.
+        let root = Region { seeds: vec![(Cell::ROOT, f64::INFINITY)], best: 0.0, place: surface.mesh().corners(0)[0] };
+        let found = deepest(octree, vec![root], tolerance, f64::NEG_INFINITY, "greatest depth", run)?;
+        if let Some(&deepest) = found.first()
+            && deepest.depth.lower > 0.0
+        {
+            return Ok(deepest);
+        }
+        if tolerance <= fine {
+            break;
+        }
     }
+    Err(no_inside(surface))
 }
 
 fn no_inside(surface: &Surface) -> Error {

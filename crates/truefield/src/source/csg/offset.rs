@@ -34,7 +34,9 @@ impl Offset {
         let shape = if distance > 0.0 { kept(shape) } else { Arc::clone(shape) };
         let deepest = shape.extent().map(|extent| 0.5 * extent.size().min_element());
         if deepest.is_some_and(|deepest| distance <= -deepest) {
-            return Err(Error::invalid(format!("the offset is {distance}, which leaves nothing of the shape; no point of it is so deep")));
+            return Err(Error::invalid(format!(
+                "the offset is {distance:?}, which leaves nothing of the shape; no point of it is so deep"
+            )));
         }
         let grown = Self { shape, distance, inside: None };
         let inside = grown.extent().filter(|_| distance < 0.0).and_then(|extent| {
