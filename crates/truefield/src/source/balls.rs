@@ -7,7 +7,7 @@
 
 use crate::distance::{SampleBlock, Source};
 use crate::error::Result;
-use crate::geom::{DVec3, Interval};
+use crate::geom::{Aabb, DVec3, Interval};
 use crate::source::kink::{self, Operand, Seam};
 
 /// How far away samples are taken, in radii of the cell.
@@ -17,9 +17,19 @@ const FAR: [f64; 3] = [2.0, 6.0, 18.0];
 const OPEN: f64 = 0.1;
 
 /// [`Source::residual`] of a shape whose values are its distances, but for its slack.
-///
-/// Off the surface a distance also bends by no more than that of a point.
 pub(crate) fn of_distance(source: &dyn Source, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
+    let off = of_point(source, block, out);
+    narrow(block, off, asked(source), out)?;
+    if is_open(block, out) {
+        of_bend(source, block, out);
+    }
+    Ok(())
+}
+
+/// What the distance to the samples says: off the surface a distance bends by no more than that of a point.
+///
+/// Returns how far values may be from distances.
+pub(crate) fn of_point(source: &dyn Source, block: &SampleBlock<'_>, out: &mut [Interval]) -> f64 {
     let slack = source.slack(&block.cell);
     let off = slack.upper.max(-slack.lower);
     let nearest = block.values.iter().fold(f64::INFINITY, |nearest, value| nearest.min(value.abs()));
@@ -32,21 +42,26 @@ pub(crate) fn of_distance(source: &dyn Source, block: &SampleBlock<'_>, out: &mu
     };
     let noise = source.noise_over(&block.cell);
     block.residual(block.between(bend, noise).widen(if least > 0.0 { 2.0 * off } else { 0.0 }), out);
-    let ask = |points: &[DVec3], out: &mut [Interval]| {
+    off
+}
+
+/// Narrows by how the source's values bend.
+pub(crate) fn of_bend(source: &dyn Source, block: &SampleBlock<'_>, out: &mut [Interval]) {
+    let mut bent = vec![Interval::ALL; out.len()];
+    block.residual(block.between(source.bend(&block.cell), source.noise_over(&block.cell)), &mut bent);
+    out.iter_mut().zip(bent).for_each(|(out, bent)| *out = out.intersection(bent));
+}
+
+/// Where a source is.
+pub(crate) fn asked(source: &dyn Source) -> impl Fn(&[DVec3], &mut [Interval]) -> Result<()> {
+    |points: &[DVec3], out: &mut [Interval]| {
         source.at_many(points, out);
         Ok(())
-    };
-    narrow(block, off, ask, out)?;
-    if is_open(block, out) {
-        let mut bent = vec![Interval::ALL; out.len()];
-        block.residual(block.between(source.bend(&block.cell), noise), &mut bent);
-        out.iter_mut().zip(bent).for_each(|(out, bent)| *out = out.intersection(bent));
     }
-    Ok(())
 }
 
 /// Whether it is worth while to ask for more.
-fn is_open(block: &SampleBlock<'_>, out: &[Interval]) -> bool {
+pub(crate) fn is_open(block: &SampleBlock<'_>, out: &[Interval]) -> bool {
     out.iter().any(|out| out.upper.max(-out.lower) > OPEN * block.cell.radius())
 }
 
@@ -58,31 +73,51 @@ pub(crate) fn narrow(
     ask: impl Fn(&[DVec3], &mut [Interval]) -> Result<()>,
     out: &mut [Interval],
 ) -> Result<()> {
-    let radius = block.cell.radius();
-    let center = node(block, |n| n / 2);
-    let slope = slope(block, center, |_| Side::Middle);
-    if !(off < radius) {
+    if !(off < block.cell.radius()) {
         return Ok(());
     }
-    if slope != DVec3::ZERO {
-        let ways = FAR.into_iter().flat_map(|far| [far * radius, -far * radius]);
-        let far: Vec<DVec3> = ways.map(|way| block.points[center] + slope * way).collect();
-        by_balls(block, off, &far, &ask, out)?;
-    }
-    let one_side = block.values.iter().all(|value| (*value > 0.0) == (block.values[0] > 0.0));
-    if one_side && is_open(block, out) {
-        let feet: Vec<DVec3> = (0..8usize)
-            .filter(|corner| block.boxes[2] > 0 || corner & 4 == 0)
-            .map(|corner| {
-                let upper = |axis: usize| corner >> axis & 1 == 1;
-                let at = node_at(block, |axis, n| if upper(axis) { n } else { 0 });
-                let slope = self::slope(block, at, |axis| if upper(axis) { Side::Upper } else { Side::Lower });
-                block.points[at] - slope * block.values[at]
-            })
-            .collect();
-        by_balls(block, off, &feet, &ask, out)?;
+    far(block, off, &ask, out)?;
+    if is_open(block, out) {
+        feet(block, off, &ask, out)?;
     }
     Ok(())
+}
+
+/// [`narrow`] by balls whose centres lie far away to either side.
+fn far(block: &SampleBlock<'_>, off: f64, ask: &impl Fn(&[DVec3], &mut [Interval]) -> Result<()>, out: &mut [Interval]) -> Result<()> {
+    let (radius, center) = (block.cell.radius(), node(block, |n| n / 2));
+    let slope = slope(block, center, |_| Side::Middle);
+    if slope == DVec3::ZERO {
+        return Ok(());
+    }
+    let ways = FAR.into_iter().flat_map(|far| [far * radius, -far * radius]);
+    let far: Vec<DVec3> = ways.map(|way| block.points[center] + slope * way).collect();
+    by_balls(block, off, &far, ask, out)
+}
+
+/// [`narrow`] by balls around where the surface seems nearest to the corners, if all samples are on one side.
+///
+/// Returns how far these are apart along each axis.
+pub(crate) fn feet(
+    block: &SampleBlock<'_>,
+    off: f64,
+    ask: &impl Fn(&[DVec3], &mut [Interval]) -> Result<()>,
+    out: &mut [Interval],
+) -> Result<Option<DVec3>> {
+    if !block.values.iter().all(|value| (*value > 0.0) == (block.values[0] > 0.0)) {
+        return Ok(None);
+    }
+    let corners = (0..8usize).filter(|corner| block.boxes[2] > 0 || corner & 4 == 0);
+    let feet: Vec<DVec3> = corners
+        .map(|corner| {
+            let upper = |axis: usize| corner >> axis & 1 == 1;
+            let at = node_at(block, |axis, n| if upper(axis) { n } else { 0 });
+            let slope = slope(block, at, |axis| if upper(axis) { Side::Upper } else { Side::Lower });
+            block.points[at] - slope * block.values[at]
+        })
+        .collect();
+    by_balls(block, off, &feet, ask, out)?;
+    Ok(Some(Aabb::around(feet).size()))
 }
 
 /// Balls around some points.

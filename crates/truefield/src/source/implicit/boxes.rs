@@ -1,6 +1,6 @@
 //! The hierarchy of boxes that may hold surface.
 
-use super::sheet::{Content, Sheet, Side, is_level};
+use super::sheet::{Content, Sheet, Side, is_level, is_steady};
 use super::tape::Tape;
 use super::taylor::Taylor;
 use crate::error::{Error, Result};
@@ -18,6 +18,9 @@ const MARGIN: f64 = 1e-3;
 
 /// How far around a leaf its sheet is known, in sizes of the box: a foot in it then is proven nearest in its neighbours, too.
 const AROUND: f64 = 0.5;
+
+/// Gradients of an inner box differ from their middle by no more than this part of it where it is seen as one sheet.
+const TURNING: f64 = 1.0;
 
 /// Steps toward the other side.
 const BEYOND: usize = 8;
@@ -236,12 +239,11 @@ fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
 
 /// What is known of a box as of one sheet, where it has second derivatives, and around it.
 fn slab(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Option<Box<(Taylor, Sheet)>> {
-    let sheet = Sheet::over(tape, cell);
-    if !sheet.turns.width().is_finite() {
+    if !is_steady(&tape.slopes(cell), TURNING) {
         return None;
     }
-    let taylor = Taylor::of(tape, &sheet);
-    taylor.thickness().is_finite().then(|| Box::new((taylor, around(tape, domain, cell))))
+    let sheet = Sheet::over(tape, cell);
+    sheet.turns.width().is_finite().then(|| Box::new((Taylor::of(tape, &sheet), around(tape, domain, cell))))
 }
 
 /// What is known of a box and around it, within the domain.

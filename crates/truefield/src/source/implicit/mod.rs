@@ -8,6 +8,7 @@ mod interval;
 mod jet;
 mod matrix;
 mod number;
+mod residual;
 mod search;
 mod shape;
 mod sheet;

@@ -518,10 +518,11 @@ impl<'a> Search<'a> {
         let mut half = WIDE * cell.size().max_element();
         for _ in 0..SHRINKS {
             let around = Aabb::new((foot.point - half).max(self.domain.min), (foot.point + half).min(self.domain.max));
-            if self.holds(&foot.proof(&here, self.p, &Sheet::over(self.tape, &around), &around)) {
+            let proof = foot.proof(&here, self.p, &Sheet::over(self.tape, &around), &around);
+            half *= 0.5;
+            if self.holds(&proof) && (proof.within.max - proof.within.min).max_element() >= half {
                 break;
             }
-            half *= 0.5;
         }
         self.is_proven(cell)
     }

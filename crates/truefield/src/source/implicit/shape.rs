@@ -9,7 +9,6 @@ use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
-use crate::source::balls;
 
 /// The part of a domain where a formula is negative, with its true distance.
 ///
@@ -209,7 +208,7 @@ impl Source for Implicit {
     }
 
     fn residual(&self, block: &SampleBlock<'_>, out: &mut [Interval]) -> Result<()> {
-        balls::of_distance(self, block, out)
+        super::residual::residual(self, block, out)
     }
 
     fn noise(&self) -> f64 {

@@ -131,7 +131,7 @@ impl Content {
         if let Some(side) = Side::of(mean) {
             return Self::Nothing(side);
         }
-        if !steady(&slopes) {
+        if !is_steady(&slopes, STEADY) {
             return Self::Open;
         }
         let sheet = Sheet::over(tape, cell);
@@ -204,8 +204,8 @@ impl Bend {
     }
 }
 
-/// Whether gradients point the same way, more or less.
-fn steady(gradient: &[Interval; 3]) -> bool {
+/// Whether gradients differ from their middle by no more than that part of it.
+pub(super) fn is_steady(gradient: &[Interval; 3], part: f64) -> bool {
     let (middle, radius) = middle_of(gradient);
-    radius <= STEADY * middle.length() && middle.length() > 0.0
+    radius <= part * middle.length() && middle.length() > 0.0
 }

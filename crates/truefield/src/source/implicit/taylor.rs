@@ -97,11 +97,6 @@ impl Taylor {
         p.distance(self.onto) + self.reach + 8.0 * f64::EPSILON * size
     }
 
-    /// Half of what lies between two planes that hold the surface.
-    pub(super) fn thickness(&self) -> f64 {
-        self.thickness
-    }
-
     /// The sign of the formula in the middle.
     pub(super) fn level(&self) -> f64 {
         self.value
