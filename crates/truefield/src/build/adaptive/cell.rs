@@ -89,9 +89,9 @@ pub(super) struct Part {
 
 impl Part {
     /// What is told by the cell that it is a part of.
-    pub fn at<'b>(&'b self, told: [f64; 8], list: &'b [Slot]) -> At<'b> {
+    pub fn at<'b>(&'b self, center: Option<DVec3>, told: [f64; 8], list: &'b [Slot]) -> At<'b> {
         let Start { range, side, .. } = self.start;
-        At { cell: self.cell, range, side, corners: &self.corners, center: None, told, list }
+        At { cell: self.cell, range, side, corners: &self.corners, center, told, list }
     }
 }
 

@@ -8,7 +8,8 @@
 //!    d(T) - u at the corners. It is at most any mean of such distances too, so that where one of two is p too large at
 //!    some corners, and the other q at the rest, u - I is at most p q / (p + q); see `mixed`.
 //! 3. u is one of the d(T), each of which lies above its tangents, at the cell's centre and at corners, and so above any mean of
-//!    them: u - I is at least the least over T of the least (mean - u) at the corners.
+//!    them, and above the height over any plane that it is behind: u - I is at least the least over T of the least (mean - u)
+//!    at the corners. Points, planes and triangles say more of parts of the cell: I is known at their corners, u need not be.
 //! 4. Near a sound piece of surface, signed: let all normals n of the list be within a of their mean m. Seen along m the
 //!    surface around q, which is nearest to p, is a graph of slopes g(n); it touches the plane across p - q there and
 //!    stays on one side, so that the plane's slope is a mean of the g (0 is in Clarke's subdifferential at a largest
@@ -17,20 +18,21 @@
 //! 5. There the gradient of the distance is such a mean brought to length 1: see `planes`.
 
 use super::corner::Corner;
-use super::halves::of_part;
+use super::halves::{blend, of_part};
 use super::planes::{Plane, Slopes, between_planes};
+use super::triangles::{SHORT, above_triangles, below_triangles};
 use crate::bvh::cover::{OCTANTS, Range};
 use crate::bvh::octants::NODES;
-use crate::bvh::tree::{Slot, Tree};
-use crate::geom::{Aabb, DVec3, Facet, Interval};
+use crate::bvh::tree::Slot;
+use crate::geom::{Aabb, DVec3, Interval};
 use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::{Side, Surface};
 
-/// Longer lists are not looked through triangle by triangle.
-const SHORT: usize = 32;
-
 /// Longer lists are not looked through plane by plane.
 const PLANES: usize = 128;
+
+/// What is this many times too large is not made small enough by a look at parts of a cell.
+const HOPE: f64 = 2.0;
 
 /// A cell, and what is known of it.
 pub(super) struct At<'a> {
@@ -87,10 +89,21 @@ impl<'a> Prover<'a> {
         }
         if let Some(side) = at.side {
             let told = told.map(|v| side.sign() * v);
-            let feet: [DVec3; 9] = std::array::from_fn(|k| if k < 8 { corners[k].foot } else { at.center.unwrap_or(corners[0].foot) });
-            known = known.intersection(signed(side, by_corners(corners, &feet, &told, size.x, limit)));
+            known = known.intersection(signed(side, by_corners(corners, &feet(at), &told, size.x, limit)));
         }
         known.widen(self.slack(&at.cell))
+    }
+
+    /// Sharpens `known`, as by `coarse`, from above: by points of the surface, in parts of the cell. Nothing of these is asked.
+    pub fn parts(&self, at: &At<'_>, known: Interval, limit: f64) -> Interval {
+        let Some(side) = at.side else { return known };
+        let above = signed(side, known).upper;
+        if above <= limit || above > HOPE * limit {
+            return known;
+        }
+        let told = at.told.map(|v| side.sign() * v);
+        let upper = above_in_parts(&at.cell, &feet(at), &blend(&told), limit);
+        known.intersection(signed(side, Interval { lower: f64::NEG_INFINITY, upper }).widen(self.slack(&at.cell)))
     }
 
     /// Sharpens `known` by the planes of the list's triangles. Also returns which way the distance can change.
@@ -104,15 +117,42 @@ impl<'a> Prover<'a> {
         }
     }
 
-    /// Sharpens `known` by the triangles of the list, from above until it is within `limit`.
+    /// Sharpens `known` by the triangles of the list, where it is not within `limit`.
     pub fn triangles(&self, at: &At<'_>, known: Interval, limit: f64) -> Interval {
-        match at.side {
-            Some(side) if at.list.len() <= SHORT && !at.list.is_empty() => {
-                let told = at.told.map(|v| side.sign() * v);
-                known.intersection(signed(side, by_triangles(self.surface.tree(), at, &told, limit)).widen(self.slack(&at.cell)))
+        let Some(side) = at.side.filter(|_| !at.list.is_empty()) else { return known };
+        let (tree, told, mut found) = (self.surface.tree(), at.told.map(|v| side.sign() * v), Interval::ALL);
+        let unsigned = signed(side, known);
+        if unsigned.upper > limit {
+            // Of long lists little is known from above.
+            if at.list.len() > SHORT {
+                return known;
             }
-            _ => known,
+            found.upper = above_triangles(tree, &at.cell, at.list, &told, limit);
         }
+        if unsigned.lower < -limit && unsigned.upper.min(found.upper) <= limit {
+            found.lower = below_triangles(tree, &at.cell, at.list, &told, limit);
+        }
+        known.intersection(signed(side, found).widen(self.slack(&at.cell)))
+    }
+
+    /// Sharpens `known` from below by the triangles of the list, in parts of the cell. Nothing of these is asked.
+    pub fn triangles_in_parts(&self, at: &At<'_>, known: Interval, limit: f64) -> Interval {
+        let Some(side) = at.side.filter(|_| !at.list.is_empty()) else { return known };
+        let unsigned = signed(side, known);
+        if unsigned.upper > limit || unsigned.lower >= -limit || unsigned.lower < -HOPE * limit {
+            return known;
+        }
+        let (told, center) = (blend(&at.told.map(|v| side.sign() * v)), at.cell.center());
+        let mut lower = f64::INFINITY;
+        for octant in 0..OCTANTS {
+            let corner = at.cell.corner(octant);
+            let part = Aabb::new(corner.min(center), corner.max(center));
+            lower = lower.min(below_triangles(self.surface.tree(), &part, at.list, &of_part(&told, octant), limit));
+            if lower < -limit {
+                return known;
+            }
+        }
+        known.intersection(signed(side, Interval { lower, upper: f64::INFINITY }).widen(self.slack(&at.cell)))
     }
 
     /// 5: contains the distance minus what is told, which differ by so much at the corners of the parts.
@@ -142,70 +182,6 @@ impl<'a> Prover<'a> {
         let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(cell.min.abs()).max(cell.max.abs()).max_element();
         128.0 * f64::EPSILON * reach + 1e-9 * cell.radius()
     }
-}
-
-multiversion!(
-    /// 2 and 3: contains the unsigned distance minus the interpolation of `told`; from above no sharper than `limit`.
-    fn by_triangles(tree: &Tree, at: &At<'_>, told: &[f64; 8], limit: f64) -> Interval = by_triangles_body
-);
-
-#[inline(always)]
-fn by_triangles_body<F: Fuse>(tree: &Tree, at: &At<'_>, told: &[f64; 8], limit: f64) -> Interval {
-    let center = at.cell.center();
-    let places: [DVec3; 8] = std::array::from_fn(|j| at.cell.corner(j));
-    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| places[j][axis]) };
-    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-    let (mut rows, mut under) = ([[0.0; 8]; SHORT], [[0.0; 8]; SHORT]);
-    let mut plain = f64::INFINITY;
-    for (number, &slot) in at.list.iter().enumerate() {
-        let facet = tree.facet_at(slot);
-        for lane in 0..8 {
-            rows[number][lane] = facet.distance_squared(DVec3::new(xs[lane], ys[lane], zs[lane])).sqrt() - told[lane];
-        }
-        under[number] = under_tangent(facet, center, &places, told);
-        plain = plain.min(-highest(&under[number]));
-    }
-    let upper = mixed(&rows[..at.list.len()], limit);
-    if plain >= -limit || upper > limit {
-        return Interval { lower: plain, upper };
-    }
-    let mut lower = f64::INFINITY;
-    for (&slot, row) in at.list.iter().zip(&under) {
-        lower = lower.min(-above_tangents(tree.facet_at(slot), row, &places, told, limit));
-        if lower < -limit {
-            // No more is wanted of what fails.
-            return Interval { lower: plain, upper };
-        }
-    }
-    Interval { lower, upper }
-}
-
-/// The largest number of a mean of a tangent's row and of those where it is largest; stops at `limit`.
-#[inline(always)]
-fn above_tangents(facet: &Facet, row: &[f64; 8], places: &[DVec3; 8], told: &[f64; 8], limit: f64) -> f64 {
-    let (mut rows, mut least, mut high) = ([*row; 3], *row, highest(row));
-    for count in 1..3 {
-        if high <= limit {
-            break;
-        }
-        rows[count] = under_tangent(facet, places[place_of(&least, highest(&least))], places, told);
-        for lane in 0..8 {
-            least[lane] = if rows[count][lane] < least[lane] { rows[count][lane] } else { least[lane] };
-        }
-        high = mixed(&rows[..=count], limit);
-    }
-    high
-}
-
-/// What is told at the corners less the tangent of the distance to a triangle at `p`.
-#[inline(always)]
-fn under_tangent(facet: &Facet, p: DVec3, places: &[DVec3; 8], told: &[f64; 8]) -> [f64; 8] {
-    let foot = facet.foot(p);
-    let away = p - (facet.a + facet.ab * foot.s + facet.ac * foot.t);
-    let distance = foot.distance_squared.sqrt();
-    // On the triangle there is no tangent; zero is below.
-    let (base, slope) = if distance > 0.0 { (distance, away / distance) } else { (0.0, DVec3::ZERO) };
-    std::array::from_fn(|lane| told[lane] - (base + slope.dot(places[lane] - p)))
 }
 
 /// How often a better mean is looked for.
@@ -238,12 +214,47 @@ fn above_feet(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: 
     mixed(&rows, limit)
 }
 
+/// Points of the surface that are near a cell.
+fn feet(at: &At<'_>) -> [DVec3; 9] {
+    std::array::from_fn(|k| if k < 8 { at.corners[k].foot } else { at.center.unwrap_or(at.corners[0].foot) })
+}
+
+multiversion!(
+    /// 2 for points of the surface, one part of the cell after the other: the unsigned distance is at most so much more than what is
+    /// told at the corners of the parts; no sharper than `limit`.
+    pub(super) fn above_in_parts(cell: &Aabb, feet: &[DVec3; 9], told: &[f64; NODES], limit: f64) -> f64 = above_in_parts_body
+);
+
+#[inline(always)]
+fn above_in_parts_body<F: Fuse>(cell: &Aabb, feet: &[DVec3; 9], told: &[f64; NODES], limit: f64) -> f64 {
+    let along = |axis: usize| [cell.min[axis], cell.center()[axis], cell.max[axis]];
+    let (xs, ys, zs) = (along(0), along(1), along(2));
+    let mut rows = [[0.0; NODES]; 9];
+    for (row, foot) in rows.iter_mut().zip(feet) {
+        let square = |from: f64| move |at: f64| (at - from) * (at - from);
+        let (x, y, z) = (xs.map(square(foot.x)), ys.map(square(foot.y)), zs.map(square(foot.z)));
+        for node in 0..NODES {
+            row[node] = (x[node % 3] + y[node / 3 % 3] + z[node / 9]).sqrt() - told[node];
+        }
+    }
+    let mut high = f64::NEG_INFINITY;
+    for octant in 0..OCTANTS {
+        let found = mixed(&rows.map(|row| of_part(&row, octant)), limit);
+        high = if found > high { found } else { high };
+        if high > limit {
+            break;
+        }
+    }
+    // Of what fails nothing else is known.
+    if high > limit { f64::INFINITY } else { high }
+}
+
 /// The largest number of a mean of the rows, whose weights are chosen so that it is small; stops at `limit`.
 ///
 /// Whatever the weights are, the mean bounds what each of the rows bounds. From the row whose largest number is the least on:
 /// where it is largest, another row is smallest; of both as much as makes the largest numbers equal.
 #[inline(always)]
-fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
+pub(super) fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
     let (mut mean, mut high) = ([0.0; 8], f64::INFINITY);
     for row in rows {
         let highest = highest(row);
@@ -292,7 +303,7 @@ fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
 
 /// The largest of eight numbers, halves at a time.
 #[inline(always)]
-fn highest(row: &[f64; 8]) -> f64 {
+pub(super) fn highest(row: &[f64; 8]) -> f64 {
     let more = |a: f64, b: f64| if b > a { b } else { a };
     let four: [f64; 4] = std::array::from_fn(|j| more(row[j], row[j + 4]));
     let two: [f64; 2] = std::array::from_fn(|j| more(four[j], four[j + 2]));
@@ -301,7 +312,7 @@ fn highest(row: &[f64; 8]) -> f64 {
 
 /// The first place of a number in a row.
 #[inline(always)]
-fn place_of(row: &[f64; 8], number: f64) -> usize {
+pub(super) fn place_of(row: &[f64; 8], number: f64) -> usize {
     (0..8).rev().fold(0, |at, j| if row[j] == number { j } else { at })
 }
 
@@ -312,7 +323,7 @@ fn place_of(row: &[f64; 8], number: f64) -> usize {
 /// rest makes of it, which is at most |b| times the rest. So u^2 >= U^2 - S, S = sum of (h^2 - b^2) t (1 - t) + |b| rest, and
 /// u >= U - e where S - 2 e U + e^2 <= 0: a sum over the axes that is largest where each is.
 #[inline(always)]
-fn below(distances: &[f64; 8], edge: f64, enough: f64) -> f64 {
+pub(super) fn below(distances: &[f64; 8], edge: f64, enough: f64) -> f64 {
     let least = ends(distances).0;
     let (mean, falls, rest) = affine(distances);
     let squares = falls.map(|fall| fall * fall);
@@ -380,11 +391,11 @@ fn signed(side: Side, unsigned: Interval) -> Interval {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::laws::Random;
 
-    fn interpolate(numbers: &[f64; 8], at: DVec3) -> f64 {
+    pub fn interpolate(numbers: &[f64; 8], at: DVec3) -> f64 {
         let weight = |j: usize, axis: usize| if j >> axis & 1 == 1 { at[axis] } else { 1.0 - at[axis] };
         (0..8).map(|j| numbers[j] * weight(j, 0) * weight(j, 1) * weight(j, 2)).sum()
     }

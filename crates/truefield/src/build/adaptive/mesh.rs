@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::cell::{Part, Seen, Start, place, within};
-use super::corner::{Corner, corner, found, list_side, one_side, side_by, side_of_ball};
+use super::corner::{Corner, corner, found, list_side, nearest_of, one_side, side_by, side_of_ball};
 use super::facets::Prover;
 use super::halves::{CENTER, Halves, INNER, blend, of_part};
 use super::planes::Plane;
@@ -322,7 +322,16 @@ impl<'a> Builder<'a> {
         }
         parts.extend((0..OCTANTS).map(|octant| self.part(&seen.start, halves, octant)));
         let limit = seen.limit;
-        let coarse = |prover: &Prover<'_>, octant: usize| prover.coarse(&parts[octant].at(of_part(&blended, octant), &[]), limit);
+        let surface = self.job.surface;
+        let coarse = |prover: &Prover<'_>, octant: usize| {
+            let (part, told) = (&parts[octant], of_part(&blended, octant));
+            let known = prover.coarse(&part.at(None, told, &[]), limit);
+            if samples || within(known, limit) {
+                return known;
+            }
+            let foot = nearest_of(surface, part.cell.center(), &part.corners);
+            prover.parts(&part.at(Some(foot), told, &[]), known, limit)
+        };
         // Parts are looked at one by one. The first that fails decides, unless its list or the cell's says more.
         let mut by_corners = [Interval::ALL; OCTANTS];
         let mut failing = None;
@@ -344,9 +353,13 @@ impl<'a> Builder<'a> {
         }
         let mut lists = None;
         let by_list = |prover: &Prover<'_>, octant: usize, known: Interval, lists: &Parts| {
-            let at = parts[octant].at(of_part(&blended, octant), &lists.lists[octant]);
+            let at = parts[octant].at(None, of_part(&blended, octant), &lists.lists[octant]);
             let known = prover.planes(&at, known).0;
-            if samples || within(known, limit) { known } else { prover.triangles(&at, known, limit) }
+            if samples || within(known, limit) {
+                return known;
+            }
+            let known = prover.triangles(&at, known, limit);
+            prover.triangles_in_parts(&at, known, limit)
         };
         if let Some(failing) = failing {
             let few = self.split(1 << failing, halves, list, None);
@@ -480,7 +493,9 @@ impl<'a> Builder<'a> {
                 let side = start.side.or_else(|| if parted { side_by(surface, p, distance, &near) } else { None });
                 found(surface, p, answer, side)
             };
-            halves.set(number, if parted { found() } else { *self.corners.entry(key(place)).or_insert_with(found) });
+            // Only sides that have to be asked are dear.
+            let cheap = parted || start.side.is_some();
+            halves.set(number, if cheap { found() } else { *self.corners.entry(key(place)).or_insert_with(found) });
         }
     }
 

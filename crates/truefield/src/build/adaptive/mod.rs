@@ -11,6 +11,7 @@ mod facets;
 mod halves;
 mod mesh;
 mod planes;
+mod triangles;
 pub(crate) mod verify;
 
 use crate::distance::{SampleBlock, Source};
