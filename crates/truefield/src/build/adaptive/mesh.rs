@@ -39,7 +39,7 @@ const LONGEST: usize = 14;
 const LISTED: usize = 128;
 
 /// Those of a cell that may be divided; its corners' nearest points shorten the list.
-const MOST: usize = 1024;
+const MOST: usize = 2048;
 
 /// Exact leaves this many times their half diagonal away are not divided for the sake of their lists, which are as long in
 /// the parts.
