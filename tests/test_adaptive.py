@@ -72,6 +72,7 @@ def test_exact_fields_need_no_tolerance_and_others_do(part: tf.TriangleMesh) -> 
     [
         ({"tolerance": -1.0}, "tolerance"),
         ({"tolerance": np.nan}, "tolerance"),
+        ({"tolerance": 1e-30}, "rounding"),
         ({"growth": -0.5}, "growth"),
         ({"growth": np.nan}, "growth"),
         ({"max_depth": 99}, "max_depth"),
@@ -97,6 +98,8 @@ def test_what_does_not_fit_is_refused_before_it_is_built(part: tf.TriangleMesh) 
     for shape in (part, csg.sphere(1.0)):
         with pytest.raises(MemoryError, match="larger tolerance"):
             tf.adaptive_field(shape, 1e-6, memory=2**22)
+        with pytest.raises(MemoryError, match="of 1e-14 "):
+            tf.adaptive_field(shape, 1e-14, memory=2**22)
 
 
 def test_progress_is_told_and_can_stop() -> None:

@@ -365,4 +365,6 @@ fn marches_can_be_stopped() {
     let run = Run { cancel: &cancel, ..two() };
     assert_eq!(wavefront(&volume.shape, &volume.sampling, &volume.sites, FAR, PLENTY, &run), Err(Error::Cancelled));
     assert_eq!(march_sites(&volume.shape, &volume.sampling, &volume.sites, FAR, PLENTY, &run), Err(Error::Cancelled));
+    // However few voxels are there to settle, and many trials to begin with.
+    assert_eq!(march_sites(&[2, 2, 2], &[1.0; 3], &[true; 8], FAR, PLENTY, &run), Err(Error::Cancelled));
 }

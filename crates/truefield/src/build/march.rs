@@ -16,7 +16,7 @@ use crate::geom::DVec3;
 use crate::grid::Grid;
 use crate::run::Run;
 
-/// Voxels that settle between two looks at the flag that cancels.
+/// Trials between two looks at the flag that cancels.
 const CHUNK: usize = 4096;
 
 /// What a march leaves behind.
@@ -102,21 +102,25 @@ fn settle(
             trials.push(Reverse((distance.to_bits(), index, point)));
         }
     };
-    for &(voxel, point) in known {
+    for (number, &(voxel, point)) in known.iter().enumerate() {
+        if number % CHUNK == 0 {
+            run.cancel.check()?;
+        }
         offer(&mut trials, &mut least[voxel as usize], place(voxel), voxel, point);
     }
-    let mut settled = 0;
+    let (mut settled, mut tried) = (0, 0usize);
     while let Some(Reverse((bits, index, point))) = trials.pop() {
+        tried += 1;
+        if tried % CHUNK == 0 {
+            run.cancel.check()?;
+            run.progress.report("march", settled, count);
+        }
         // A trial that a nearer point has overtaken.
         if points[index as usize] != NO_SITE || f64::from_bits(bits) != least[index as usize] {
             continue;
         }
         points[index as usize] = point;
         settled += 1;
-        if settled % CHUNK == 0 {
-            run.cancel.check()?;
-            run.progress.report("march", settled, count);
-        }
         let at = place(index);
         for &(step, jump) in &ring {
             let next = [0, 1, 2].map(|axis| at[axis].wrapping_add_signed(step[axis]));

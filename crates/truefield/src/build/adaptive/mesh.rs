@@ -65,6 +65,7 @@ pub enum Leaves {
 /// Exact leaves are divided until their lists are short; the tolerance does not matter to them.
 pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: &Rules, run: &Run<'_>) -> Result<AdaptiveField> {
     rules.check()?;
+    rules.check_rounding(&root)?;
     if root.division != Division::Octree {
         return Err(Error::invalid("a mesh is divided into an octree; a quadtree is for shapes that do not depend on z"));
     }

@@ -85,6 +85,19 @@ impl Rules {
         self.accuracy().check()
     }
 
+    /// Refuses a tolerance that is less than the rounding of the places in a tree, which no cell can reach.
+    pub(crate) fn check_rounding(&self, root: &Root) -> Result<()> {
+        let reach = root.extent.min.abs().max(root.extent.max.abs()).max_element();
+        let least = f64::EPSILON * reach;
+        if self.tolerance >= least {
+            return Ok(());
+        }
+        Err(Error::invalid(format!(
+            "a tolerance of {:e} is below what rounding leaves of coordinates up to {reach:e}; give at least {least:.1e}, better much more",
+            self.tolerance
+        )))
+    }
+
     /// The largest error of a cell no point of which is nearer to the surface than `least`.
     pub(crate) fn allowed(&self, least: f64) -> f64 {
         self.accuracy().allowed(least)
@@ -97,7 +110,7 @@ impl Rules {
             return Ok(());
         }
         let what = format!(
-            "an adaptive field to a tolerance of {} (depth {depth} with {cells} cells reaches {within:.3e}; choose a larger tolerance or growth, or a max_depth)",
+            "an adaptive field to a tolerance of {:?} (depth {depth} with {cells} cells reaches {within:.3e}; choose a larger tolerance or growth, or a max_depth)",
             self.tolerance
         );
         Err(Error::Memory { what, needed, allowed: self.memory })
@@ -142,6 +155,7 @@ pub fn root(source: &dyn Source, domain: Option<Aabb>, division: Division) -> Re
 /// as the rules ask, but for what the shape itself leaves open.
 pub fn adaptive(source: &dyn Source, root: Root, rules: &Rules, run: &Run<'_>) -> Result<AdaptiveField> {
     rules.check()?;
+    rules.check_rounding(&root)?;
     let layout = Layout::new(root.division, rules.reconstruction);
     let mut levels = Levels::new(root, Continuity::Everywhere, rules.accuracy());
     let mut parents = Vec::new();
