@@ -261,6 +261,14 @@ impl<'a> Builder<'a> {
 
     /// Judges a cell by the corners of its parts, and divides it where that is not enough.
     fn look_inside(&mut self, mut seen: Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
+        if self.job.leaves == Leaves::Exact && (1..=LIST).contains(&list.len()) {
+            // Nothing but its range is to be known of such a leaf.
+            let ([x, y, z], tree) = (seen.start.node(CENTER), self.job.surface.tree());
+            let center = self.job.lattice.corner(x, y, z);
+            let squared = list.iter().fold(f64::INFINITY, |least, &slot| least.min(tree.facet_at(slot).distance_squared(center)));
+            self.narrow(&mut seen, squared.sqrt());
+            return self.push_leaf(&seen, list, run);
+        }
         let mut own = self.owned.pop().unwrap_or_default();
         let few = list.is_empty() && self.gather(&seen, MOST, &mut own);
         let mut halves = Halves::new(seen.corners);
@@ -277,10 +285,7 @@ impl<'a> Builder<'a> {
             self.ask(&seen.start, &mut halves, CENTER);
         }
         let list = if few { own.as_slice() } else { list };
-        let center = halves.corner(CENTER);
-        let (far, radius) = (center.value.abs(), seen.cell.radius() * (1.0 + 1e-12));
-        let start = seen.start.within(Range { lower: far - radius, upper: far + radius });
-        seen.start = self.settle(self.look(start, &seen.cell, seen.corners), &seen.cell, seen.corners);
+        self.narrow(&mut seen, halves.corner(CENTER).value.abs());
         seen.limit = self.allowed(&seen.start);
         let mut parts = self.parts.pop().unwrap_or_default();
         parts.clear();
@@ -297,6 +302,13 @@ impl<'a> Builder<'a> {
         self.owned.push(own);
         self.parts.push(parts);
         done
+    }
+
+    /// What follows for a cell from how far its centre is from the surface.
+    fn narrow(&self, seen: &mut Seen<'_>, far: f64) {
+        let radius = seen.cell.radius() * (1.0 + 1e-12);
+        let start = seen.start.within(Range { lower: far - radius, upper: far + radius });
+        seen.start = self.settle(self.look(start, &seen.cell, seen.corners), &seen.cell, seen.corners);
     }
 
     /// Whether a cell with linear leaves need not be divided; and the lists of its parts, where they were needed to know.
