@@ -22,6 +22,12 @@ const AROUND: f64 = 0.5;
 /// Gradients of an inner box differ from their middle by no more than this part of it where it is seen as one sheet.
 const TURNING: f64 = 1.0;
 
+/// Leaves are known to second order up to this part of their diagonal: the less, the more queries end with the first foot.
+const ROUGH: f64 = 3e-3;
+
+/// Boxes that are smaller than this part of the domain are not cut for that.
+const FINE: f64 = 1.0 / 64.0;
+
 /// Steps toward the other side.
 const BEYOND: usize = 8;
 
@@ -76,6 +82,17 @@ enum Fate {
     Split(Option<Box<(Taylor, Sheet)>>),
 }
 
+impl Fate {
+    /// That of a box that is cut no more.
+    fn uncut(self, tape: &Tape, domain: &Aabb, cell: &Aabb) -> Self {
+        let Self::Split(_) = self else { return self };
+        match fate(tape, domain, cell, f64::INFINITY) {
+            Self::Split(_) => Self::Leaf(None, crossed(tape, domain, cell)),
+            other => other,
+        }
+    }
+}
+
 impl Boxes {
     /// Looks at the domain and all halves of what may hold surface, level by level.
     pub(super) fn build(tape: &Tape, domain: &Aabb, run: &Run<'_>) -> Result<Self> {
@@ -93,7 +110,7 @@ impl Boxes {
             let cells: Vec<Aabb> = boxes.nodes[level.clone()].iter().map(|node| node.extent).collect();
             let fates = run.blocks("boxes", cells.len().div_ceil(BLOCK), |block| {
                 let part = &cells[block * BLOCK..cells.len().min((block + 1) * BLOCK)];
-                Ok(part.iter().map(|cell| fate(tape, domain, cell)).collect::<Vec<_>>())
+                Ok(part.iter().map(|cell| fate(tape, domain, cell, ROUGH)).collect::<Vec<_>>())
             })?;
             let fates: Vec<Fate> = fates.into_iter().flatten().collect();
             let open = fates.iter().filter(|fate| matches!(fate, Fate::Split(_))).count();
@@ -101,7 +118,7 @@ impl Boxes {
             let start = boxes.nodes.len();
             for (index, fate) in level.clone().zip(fates) {
                 let extent = boxes.nodes[index].extent;
-                let fate = if last && matches!(fate, Fate::Split(_)) { Fate::Leaf(None, crossed(tape, domain, &extent)) } else { fate };
+                let fate = if last { fate.uncut(tape, domain, &extent) } else { fate };
                 match fate {
                     Fate::Gone(Side::Outside) => boxes.nodes[index].known = f32::NAN,
                     Fate::Gone(Side::Inside) => {
@@ -222,13 +239,17 @@ fn node(extent: Aabb) -> Node {
     Node { extent, first: 0, count: 0, known: 0.0, sure: false, sheet: None, slab: None }
 }
 
-fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb) -> Fate {
+/// What becomes of a box; sheets are cut whose expansions leave more open than that part of their box.
+fn fate(tape: &Tape, domain: &Aabb, cell: &Aabb, rough: f64) -> Fate {
     let touched = || Side::around(tape, domain, cell, MARGIN * cell.size().min_element());
     match Content::of(tape, cell) {
         Content::Nothing(side) => Fate::Gone(side),
         // Where zeros fill a room, surface may be anywhere in it.
         Content::Open if is_level(tape, cell) => Fate::Leaf(None, f32::INFINITY),
         Content::Open if let Some(side) = touched() => Fate::Gone(side),
+        Content::Sheet(sheet) if sheet.0.remainder() > rough * cell.diagonal() && cell.diagonal() > FINE * domain.diagonal() => {
+            Fate::Split(slab(tape, domain, cell))
+        }
         Content::Sheet(sheet) => {
             let known = if sound(&sheet.1, domain) { 0.0 } else { crossed(tape, domain, &sheet.1.extent) };
             Fate::Leaf(Some(Box::new((sheet.0, around(tape, domain, cell)))), known)

@@ -97,6 +97,11 @@ impl Taylor {
         p.distance(self.onto) + self.reach + 8.0 * f64::EPSILON * size
     }
 
+    /// How far the surface may be from the expansion, in lengths.
+    pub(super) fn remainder(&self) -> f64 {
+        self.remainder
+    }
+
     /// The sign of the formula in the middle.
     pub(super) fn level(&self) -> f64 {
         self.value
