@@ -161,6 +161,25 @@ fn a_gyroid_is_as_far_as_its_nearest_sample() {
     check_lipschitz(&gyroid, &points(&mut random, &domain.grow(1.0), 1500), 1e-12).unwrap_or_else(|broken| panic!("{broken}"));
 }
 
+/// Along the normal these bend much more than their surface does, to either side.
+#[test]
+fn what_bends_along_the_normal_only_is_as_far_as_it_is() {
+    let [x, y, z] = axes();
+    let level = |steep: f64| {
+        let power = ((square(&x) + square(&y) + square(&z) - 1.0) * steep).unary(Unary::Exponential);
+        if steep < 0.0 { Expression::constant(1.0) - power } else { power - 1.0 }
+    };
+    let mut random = Random::new(12);
+    for steep in [-6.0, -2.0, 3.0] {
+        let ball = shape(&level(steep), cube(1.5));
+        let judge = |p: DVec3| p.length() - 1.0;
+        for domain in [cube(1.5), cube(6.0)] {
+            let widest = compare(&ball, judge, &points(&mut random, &domain, 1500));
+            assert!(widest < 2e-5, "an interval is {widest} wide");
+        }
+    }
+}
+
 #[test]
 fn the_domain_bounds_the_solid() {
     // A half space in a box is a smaller box.

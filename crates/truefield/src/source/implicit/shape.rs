@@ -16,8 +16,9 @@ use crate::run::Run;
 /// surface is closed. The formula is never asked outside the domain.
 ///
 /// Its own values are no distances and are not used as such. A hierarchy of boxes holds all places where interval arithmetic
-/// cannot exclude a zero; a query goes through them, nearest first, proves from second derivatives that no surface of a box
-/// is nearer than the foot that Newton's method found, and proves by a change of sign that the surface is not farther.
+/// cannot exclude a zero. A query begins with the foot that Newton's method finds from the box that seems nearest, goes through
+/// the others, nearest first, proves from second derivatives that no surface of a box is nearer than the nearest foot, and by a
+/// change of sign that the surface is not farther.
 #[derive(Clone, Debug)]
 pub struct Implicit {
     tape: Tape,
