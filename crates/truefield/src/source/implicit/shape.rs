@@ -194,6 +194,7 @@ impl Source for Implicit {
         let near = at.upper.max(-at.lower) + radius;
         // Where bounds meet, the value is their middle and less than the noise from the distance. Elsewhere it is how far a
         // box is that may hold surface: `known` says how much farther the surface is than any point of such a box.
+        // A search that ends because it has made as many boxes as it may leaves more open, which is not counted here.
         let error = self.boxes.known_near(cell, near) + 2.0 * self.noise();
         // Both change by no more than one moves.
         let moved = 2.0 * radius + self.noise();
