@@ -1,5 +1,6 @@
 //! A tree made ready for rays: cells that the surface does not meet are one with their neighbours of the same side.
 
+use super::facets::Touching;
 use super::walk::FULL;
 use crate::error::{Error, Result};
 use crate::field::adaptive::{AdaptiveField, Cell, Division, Leaf};
@@ -47,10 +48,20 @@ impl Child {
     }
 }
 
+/// A leaf that answers in another way than by its corners.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Other {
+    /// Its middle.
+    pub center: DVec3,
+    /// Its triangles among all, or none where it is not known that the surface is theirs.
+    pub first: u32,
+    pub count: u32,
+}
+
 /// A field prepared for rays that look for one distance.
 ///
-/// Makes no more than 36 bytes of every cell that the surface meets, and of those above it; making it takes one look at
-/// every cell.
+/// Makes no more than 36 bytes of every cell that the surface meets, and of those above it, and 4 more of every triangle
+/// that touches an exact leaf; making it takes one look at every cell.
 #[derive(Debug)]
 pub struct Caster {
     pub(super) field: AdaptiveField,
@@ -64,8 +75,10 @@ pub struct Caster {
     pub(super) nodes: Vec<[u32; 8]>,
     /// Corners of trilinear leaves.
     pub(super) corners: Vec<[f32; 8]>,
-    /// Middles of leaves that answer in another way.
-    pub(super) others: Vec<DVec3>,
+    /// Leaves that answer in another way.
+    pub(super) others: Vec<Other>,
+    /// Triangles that touch exact leaves, leaf by leaf.
+    pub(super) triangles: Vec<u32>,
 }
 
 /// Part of a caster while it is made.
@@ -73,7 +86,8 @@ pub struct Caster {
 struct Part {
     nodes: Vec<[u32; 8]>,
     corners: Vec<[f32; 8]>,
-    others: Vec<DVec3>,
+    others: Vec<Other>,
+    triangles: Vec<u32>,
 }
 
 impl Caster {
@@ -93,13 +107,13 @@ impl Caster {
         });
         let parts = run.blocks("prepare for rays", blocks.len(), |number| {
             let mut part = Part::default();
-            let root = part.add(blocks[number], distance);
+            let root = part.add(blocks[number], distance, &mut Touching::of(field, distance));
             Ok((part, root))
         })?;
         let mut whole = Part::default();
         let roots: Vec<Child> = parts.into_iter().map(|(part, root)| whole.append(part, root)).collect();
         let root = whole.join(field.root(), &mut roots.into_iter()).word();
-        let Part { nodes, corners, others } = whole;
+        let Part { nodes, corners, others, triangles } = whole;
         let columns = field.division() == Division::Quadtree;
         Ok(Self {
             field: field.clone(),
@@ -111,6 +125,7 @@ impl Caster {
             nodes,
             corners,
             others,
+            triangles,
         })
     }
 
@@ -150,7 +165,7 @@ impl Caster {
 }
 
 impl Part {
-    fn add(&mut self, cell: Cell<'_>, distance: f64) -> Child {
+    fn add(&mut self, cell: Cell<'_>, distance: f64, touching: &mut Option<Touching<'_>>) -> Child {
         let count = cell.children();
         if count == 0 {
             let extent = cell.extent();
@@ -161,14 +176,23 @@ impl Part {
                     Child::Linear(self.corners.len() as u32 - 1)
                 }
                 Leaf::Cubic(_) | Leaf::Exact(_) if below % 8 != 0 || cell.over().contains(distance) => {
-                    self.others.push(extent.center());
+                    let first = self.triangles.len();
+                    let known = touching.as_mut().is_some_and(|touching| touching.add(&cell, &mut self.triangles));
+                    let count = self.triangles.len() - first;
+                    // What no triangle touches has one side.
+                    if known && count == 0 && below % 8 == 0 {
+                        return Child::Empty(below == 8);
+                    }
+                    self.others.push(Other { center: extent.center(), first: first as u32, count: count as u32 });
                     Child::Other(self.others.len() as u32 - 1)
                 }
                 _ => Child::Empty(below == 8),
             };
         }
         let children: [Child; 8] =
-            std::array::from_fn(|octant| if octant < count { self.add(cell.child(octant), distance) } else { Child::Empty(false) });
+            std::array::from_fn(
+                |octant| if octant < count { self.add(cell.child(octant), distance, touching) } else { Child::Empty(false) },
+            );
         self.node(&children[..count])
     }
 
@@ -186,6 +210,7 @@ impl Part {
     /// Adds a part made apart; returns what its root is now.
     fn append(&mut self, other: Self, root: Child) -> Child {
         let (nodes, corners, others) = (self.nodes.len() as u32, self.corners.len() as u32, self.others.len() as u32);
+        let triangles = self.triangles.len() as u32;
         let moved = |child: Child| match child {
             Child::Branch(number) => Child::Branch(number + nodes),
             Child::Linear(number) => Child::Linear(number + corners),
@@ -194,7 +219,8 @@ impl Part {
         };
         self.nodes.extend(other.nodes.into_iter().map(|node| node.map(|word| moved(Child::of(word)).word())));
         self.corners.extend(other.corners);
-        self.others.extend(other.others);
+        self.others.extend(other.others.into_iter().map(|leaf| Other { first: leaf.first + triangles, ..leaf }));
+        self.triangles.extend(other.triangles);
         moved(root)
     }
 

@@ -7,6 +7,7 @@
 mod along;
 mod beam;
 mod caster;
+mod facets;
 mod lanes;
 mod walk;
 
@@ -23,7 +24,8 @@ use crate::run::Run;
 /// Rays that a worker takes at a time.
 const CHUNK: usize = 4096;
 
-/// How the crossing in a trilinear leaf is found. Leaves that answer in another way are followed step by step.
+/// How the crossing in a trilinear leaf is found. The surface in exact leaves is met in their triangles; leaves that answer in
+/// another way, and other distances than zero in exact ones, are followed step by step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Between the ends of the way through the cell the value is taken to be linear: the paper's, and the quicker one.

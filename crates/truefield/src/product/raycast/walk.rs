@@ -7,6 +7,7 @@
 use super::Method;
 use super::along::{bernstein, first_change, first_root, trilinear, trilinear_slopes};
 use super::caster::{Caster, Child};
+use super::facets::Through;
 use super::lanes::{Lanes, Ray};
 use crate::field::adaptive::MAX_DEPTH;
 use crate::geom::DVec3;
@@ -136,6 +137,8 @@ impl Caster {
         // The value at the end of the last cell: infinite where only its side is known, not a number before the first.
         let mut carried = if prepared.outside() { f64::INFINITY } else { f64::NAN };
         let mut last = None;
+        // From where on its side is the surface's own: the next exact leaf need not be asked.
+        let mut since = None;
         loop {
             // Down to the leaf that holds the ray at t.
             while let Child::Branch(node) = Child::of(word) {
@@ -163,62 +166,78 @@ impl Caster {
                 2
             };
             let out = ends[axis_out].max(t);
-            match Child::of(word) {
-                Child::Empty(inside) => {
-                    if (carried < 0.0) != inside && !carried.is_nan() {
-                        // The face that was met last.
-                        let starts: [f64; 3] = std::array::from_fn(|axis| ray.at_plane(axis, f64::from(place[axis])));
-                        let axis = (0..3).fold(0, |last, axis| if starts[axis] > starts[last] { axis } else { last });
-                        let face = At::Face { axis, entering: inside };
-                        return Some(Found { t, at: last.unwrap_or(face) });
+            'leaf: {
+                match Child::of(word) {
+                    Child::Empty(inside) => {
+                        if (carried < 0.0) != inside && !carried.is_nan() {
+                            // The face that was met last.
+                            let starts: [f64; 3] = std::array::from_fn(|axis| ray.at_plane(axis, f64::from(place[axis])));
+                            let axis = (0..3).fold(0, |last, axis| if starts[axis] > starts[last] { axis } else { last });
+                            let face = At::Face { axis, entering: inside };
+                            return Some(Found { t, at: last.unwrap_or(face) });
+                        }
+                        (carried, last, since) = (if inside { f64::NEG_INFINITY } else { f64::INFINITY }, None, None);
                     }
-                    (carried, last) = (if inside { f64::NEG_INFINITY } else { f64::INFINITY }, None);
-                }
-                Child::Linear(number) => {
-                    let corners = &self.corners[number as usize];
-                    let at = At::Linear { number, place, size };
-                    let value = |t: f64| trilinear(corners, ray.local(t, place, shrink)) - self.distance;
-                    if CUBIC {
-                        let step = (out - t) / 3.0;
-                        let values = [value(t), value(t + step), value(out - step), value(out)];
-                        if !carried.is_nan() && (carried < 0.0) != (values[0] < 0.0) {
+                    Child::Linear(number) => {
+                        let corners = &self.corners[number as usize];
+                        let at = At::Linear { number, place, size };
+                        let value = |t: f64| trilinear(corners, ray.local(t, place, shrink)) - self.distance;
+                        if CUBIC {
+                            let step = (out - t) / 3.0;
+                            let values = [value(t), value(t + step), value(out - step), value(out)];
+                            if !carried.is_nan() && (carried < 0.0) != (values[0] < 0.0) {
+                                return Some(Found { t, at });
+                            }
+                            if let Some(part) = first_root(bernstein(values)) {
+                                return Some(Found { t: t + (out - t) * part, at });
+                            }
+                            carried = values[3];
+                        } else {
+                            let entry = if carried.is_finite() { carried } else { value(t) };
+                            if carried.is_infinite() && (carried < 0.0) != (entry < 0.0) {
+                                return Some(Found { t, at });
+                            }
+                            let exit = value(out);
+                            if (entry < 0.0) != (exit < 0.0) {
+                                return Some(Found { t: t + (out - t) * (entry / (entry - exit)).clamp(0.0, 1.0), at });
+                            }
+                            carried = exit;
+                        }
+                        (last, since) = (Some(at), None);
+                    }
+                    Child::Other(number) => {
+                        let at = At::Other(number);
+                        let begin = since.unwrap_or(t);
+                        let way = [begin, out].map(|t| prepared.start + prepared.unit * t);
+                        let entered = since.map(|_| carried < 0.0);
+                        if let Some(Through { entered, change, until }) = self.through(&self.others[number as usize], way, entered) {
+                            if !carried.is_nan() && (carried < 0.0) != entered {
+                                return Some(Found { t, at });
+                            }
+                            if let Some(part) = change {
+                                return Some(Found { t: begin + (out - begin) * part, at });
+                            }
+                            carried = if entered { f64::NEG_INFINITY } else { f64::INFINITY };
+                            (last, since) = (Some(at), Some(begin + (out - begin) * until));
+                            break 'leaf;
+                        }
+                        let cell = self.field.find(self.others[number as usize].center)?;
+                        let extent = cell.extent();
+                        let value = |t: f64| {
+                            let local = ray.local(t, place, shrink);
+                            cell.value(extent.min + extent.size() * DVec3::from_array(local)) - self.distance
+                        };
+                        let entry = value(t);
+                        if !carried.is_nan() && (carried < 0.0) != (entry < 0.0) {
                             return Some(Found { t, at });
                         }
-                        if let Some(part) = first_root(bernstein(values)) {
-                            return Some(Found { t: t + (out - t) * part, at });
+                        if let Some(part) = first_change(|s| value(t + s), out - t, SLOPE, entry < 0.0) {
+                            return Some(Found { t: t + part, at });
                         }
-                        carried = values[3];
-                    } else {
-                        let entry = if carried.is_finite() { carried } else { value(t) };
-                        if carried.is_infinite() && (carried < 0.0) != (entry < 0.0) {
-                            return Some(Found { t, at });
-                        }
-                        let exit = value(out);
-                        if (entry < 0.0) != (exit < 0.0) {
-                            return Some(Found { t: t + (out - t) * (entry / (entry - exit)).clamp(0.0, 1.0), at });
-                        }
-                        carried = exit;
+                        (carried, last, since) = (value(out), Some(at), None);
                     }
-                    last = Some(at);
+                    Child::Branch(_) => return None,
                 }
-                Child::Other(number) => {
-                    let at = At::Other(number);
-                    let cell = self.field.find(self.others[number as usize])?;
-                    let extent = cell.extent();
-                    let value = |t: f64| {
-                        let local = ray.local(t, place, shrink);
-                        cell.value(extent.min + extent.size() * DVec3::from_array(local)) - self.distance
-                    };
-                    let entry = value(t);
-                    if !carried.is_nan() && (carried < 0.0) != (entry < 0.0) {
-                        return Some(Found { t, at });
-                    }
-                    if let Some(part) = first_change(|s| value(t + s), out - t, SLOPE, entry < 0.0) {
-                        return Some(Found { t: t + part, at });
-                    }
-                    (carried, last) = (value(out), Some(at));
-                }
-                Child::Branch(_) => return None,
             }
             // On to the next cell.
             t = out;
@@ -252,7 +271,7 @@ impl Caster {
         };
         let gradient = match found.at {
             At::Face { axis, entering } => across(axis, entering),
-            At::Other(number) => self.field.find(self.others[number as usize]).map_or(DVec3::ZERO, |cell| cell.gradient(point)),
+            At::Other(number) => self.field.find(self.others[number as usize].center).map_or(DVec3::ZERO, |cell| cell.gradient(point)),
             At::Linear { number, place, size } => self.slopes(number, place, size, point, direction),
         };
         gradient.try_normalize().unwrap_or(-direction)
