@@ -5,6 +5,7 @@ mod affine;
 mod facet;
 mod interval;
 mod overlap;
+mod plane;
 
 pub use aabb::Aabb;
 pub use affine::Affine;
@@ -12,6 +13,7 @@ pub use facet::{Facet, FacetPoint};
 pub use glam::DVec3;
 pub use interval::Interval;
 pub use overlap::{triangle_meets_segment, triangle_overlaps_box};
+pub(crate) use plane::side_of_plane;
 
 /// Which part of a triangle is nearest: the papers' cases C1, C2 and C3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

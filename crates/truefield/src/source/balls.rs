@@ -211,7 +211,7 @@ mod tests {
     /// A wall, of which nothing is known but its distances, is proven to be flat.
     #[test]
     fn far_samples_prove_walls_flat() {
-        let cell = crate::geom::Aabb::new(DVec3::splat(-0.1), DVec3::splat(0.1));
+        let cell = Aabb::new(DVec3::splat(-0.1), DVec3::splat(0.1));
         let normal = DVec3::new(1.0, 2.0, 3.0).normalize();
         let nodes: Vec<DVec3> = (0..27).map(|n| DVec3::new(f64::from(n / 9), f64::from(n / 3 % 3), f64::from(n % 3)) * 0.1 - 0.1).collect();
         let values: Vec<f64> = nodes.iter().map(|p| p.dot(normal)).collect();

@@ -20,6 +20,8 @@ pub(super) fn sharpen(crossings: &mut [Crossing], leaves: &[Leaf<'_>], shape: &d
     let wanted = |e: &usize| own(&crossings[*e]).is_some_and(|leaf| !leaf.on_border);
     let list: Vec<usize> = (0..crossings.len()).filter(wanted).collect();
     let size = leaves.first().map_or(0.0, |leaf| leaf.extent().diagonal());
+    // No nearer than the shape's own values tell apart.
+    let close = (1e-12 * size).max(shape.noise().min(1e-9 * size));
     let found = run.blocks("ask the shape", list.len().div_ceil(CHUNK), |chunk| {
         let list = &list[chunk * CHUNK..((chunk + 1) * CHUNK).min(list.len())];
         // From inside to outside, with what is known there.
@@ -46,20 +48,24 @@ pub(super) fn sharpen(crossings: &mut [Crossing], leaves: &[Leaf<'_>], shape: &d
             let secant = if round.is_multiple_of(2) { a + (b - a) * (low / (low - high)) } else { 0.5 * (a + b) };
             if secant > a && secant < b { secant } else { 0.5 * (a + b) }
         };
+        let far = |[_, low, _, high]: &[f64; 4]| low.abs().min(high.abs()) > close;
+        let mut open: Vec<usize> = (0..parts.len()).filter(|&i| far(&parts[i])).collect();
         for round in 0..ROUNDS {
-            let points: Vec<DVec3> = ends.iter().zip(&parts).map(|(&(from, to), &part)| from + (to - from) * at(part, round)).collect();
-            for (part, value) in parts.iter_mut().zip(ask(&points)?) {
-                let (middle, value) = (at(*part, round), value - distance);
+            if open.is_empty() {
+                break;
+            }
+            let way = |&i: &usize| ends[i].0 + (ends[i].1 - ends[i].0) * at(parts[i], round);
+            let values = ask(&open.iter().map(way).collect::<Vec<_>>())?;
+            for (&i, value) in open.iter().zip(values) {
+                let (part, value) = (&mut parts[i], value - distance);
+                let middle = at(*part, round);
                 if value < 0.0 {
                     (part[0], part[1]) = (middle, value);
                 } else {
                     (part[2], part[3]) = (middle, value);
                 }
             }
-            let worst = parts.iter().map(|[_, low, _, high]| low.abs().min(high.abs())).fold(0.0, f64::max);
-            if worst <= 1e-12 * size {
-                break;
-            }
+            open.retain(|&i| far(&parts[i]));
         }
         let best = |[a, low, b, high]: [f64; 4]| if -low < high { a } else { b };
         let points: Vec<DVec3> = ends.iter().zip(&parts).map(|(&(from, to), &part)| from + (to - from) * best(part)).collect();

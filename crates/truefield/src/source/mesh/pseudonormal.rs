@@ -199,6 +199,19 @@ impl Pseudonormals {
         };
         (height.abs() > unsure * distance + least).then_some(height)
     }
+
+    /// Whether all surface about a point that is within rounding of a face is that face.
+    pub fn is_plane(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32) -> bool {
+        let off = self.rounding.max(64.0 * UNIT * p.abs().max_element());
+        // The point, its true nearest one and the one found are this near to each other.
+        let near = 16.0 * off;
+        let whole = |&[gap, slope]: &[f32; 2]| {
+            let (gap, slope) = (f64::from(gap), f64::from(slope));
+            gap > 2.0 * near && beyond_edges(facet, nearest, slope, 2.0 * near + slope * near)
+        };
+        let near = nearest.feature == Feature::Face && nearest.distance_squared <= 64.0 * off * off;
+        near && self.room.get(triangle as usize).is_some_and(whole)
+    }
 }
 
 /// The unit normal of a triangle; zero where it has none.

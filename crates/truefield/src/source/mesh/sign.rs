@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::bvh::Tree;
 use crate::error::Result;
-use crate::geom::{Aabb, DVec3, Facet, FacetPoint};
+use crate::geom::{Aabb, DVec3, Facet, FacetPoint, side_of_plane};
 use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
@@ -290,7 +290,11 @@ impl Decided {
             return None;
         }
         let joined = self.joined.as_ref().map(|mesh| mesh.facet(triangle));
-        let height = self.normals.side(joined.as_ref().unwrap_or(facet), p, nearest, triangle)?;
+        let facet = joined.as_ref().unwrap_or(facet);
+        // What rounding may have turned is left to the plane, where there is nothing else about.
+        let by_plane =
+            || if self.normals.is_plane(facet, p, nearest, triangle) { side_of_plane(self.sum.corners(triangle), p) } else { None };
+        let height = self.normals.side(facet, p, nearest, triangle).or_else(by_plane)?;
         Some((wall.side(height), left))
     }
 
@@ -463,6 +467,40 @@ mod tests {
             }
             // Pseudonormals leave next to nothing that is off the surface to the winding number.
             assert!(both > 100_000 && left < 300, "{wild}: {both} {left}");
+        }
+    }
+
+    #[test]
+    fn points_put_on_faces_are_decided_by_their_planes() {
+        for far in [0.0, 1e6] {
+            let ball = star(0.5, 0);
+            let vertices = ball.vertices().iter().map(|&v| v + DVec3::new(far, -far, far)).collect();
+            let asked = Asked::new(TriangleMesh::new(vertices, ball.triangles().to_vec()).expect("a mesh"), SignChoice::Auto);
+            let decided = asked.signs.decided.as_ref().expect("a rule");
+            let mut r = random(23);
+            let (mut both, mut known, mut asked_for) = (0, 0, 0);
+            for _ in 0..30_000 {
+                let [a, b, c] = asked.mesh.corners((r() * asked.mesh.triangles().len() as f64) as u32);
+                let (s, t) = (0.1 + 0.4 * r(), 0.1 + 0.4 * r());
+                let p = a + (b - a) * s + (c - a) * t;
+                let (foot, triangle) = asked.foot(p);
+                if foot.distance_squared == 0.0 {
+                    continue;
+                }
+                asked_for += 1;
+                let Some((side, _)) = decided.near(asked.tree.facet(triangle), p, &foot, triangle) else { continue };
+                known += 1;
+                // Well off the face on that side, as far as the face is all there is.
+                let normal = (b - a).cross(c - a).normalize();
+                let off = p + normal * if side == Side::Outside { 1e-6 } else { -1e-6 };
+                let (there, nearest) = asked.foot(off);
+                if nearest == triangle && there.feature == crate::geom::Feature::Face {
+                    both += 1;
+                    assert_eq!(side, asked.side(off), "{p}: {foot:?}");
+                }
+            }
+            assert!(asked_for > 3000 && f64::from(known) > 0.9 * f64::from(asked_for), "{known} of {asked_for}");
+            assert!(both > 3000, "{both}");
         }
     }
 

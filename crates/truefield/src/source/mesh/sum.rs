@@ -57,6 +57,11 @@ impl Sum {
         made.as_ref().map_or(unknown, |winding| winding.refine(p, enough))
     }
 
+    /// Of a triangle of the mesh that sides are decided on.
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.mesh.corners(triangle)
+    }
+
     pub fn side(&self, p: DVec3) -> Side {
         if self.boundary.is_empty() {
             // Whole numbers: 0 outside the box, and an error below 1 decides.
