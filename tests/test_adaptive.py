@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import truefield as tf
@@ -18,7 +20,7 @@ def part() -> tf.TriangleMesh:
     return tf.shapes.box((4.0, 3.0, 2.0))
 
 
-@pytest.mark.parametrize("method", ["linear", "cubic", "exact"])
+@pytest.mark.parametrize("method", ["linear", "cubic", "exact", "mixed"])
 @pytest.mark.parametrize("rule", ["verified", "samples"])
 def test_bounds_of_a_part_hold_its_distances(part: tf.TriangleMesh, method: str, rule: str) -> None:
     field = tf.adaptive_field(part, 0.02, growth=0.1, max_depth=6, method=method, rule=rule)  # type: ignore[arg-type]
@@ -63,8 +65,36 @@ def test_exact_fields_need_no_tolerance_and_others_do(part: tf.TriangleMesh) -> 
     assert tf.adaptive_field(part, method="exact").statistics()["exact"] > 0
     with pytest.raises(tf.TruefieldError, match="needs a tolerance"):
         tf.adaptive_field(part)
-    with pytest.raises(tf.TruefieldError, match="is for meshes"):
-        tf.adaptive_field(csg.sphere(1.0), 0.1, method="exact")
+    for method in ("exact", "mixed"):
+        with pytest.raises(tf.TruefieldError, match=f'"{method}" is for meshes'):
+            tf.adaptive_field(csg.sphere(1.0), 0.1, method=method)
+
+
+def test_mixed_fields_interpolate_where_that_will_do_and_keep_few_triangles_elsewhere(tmp_path: Path) -> None:
+    part = tf.shapes.brevi()
+    low, high = part.extent
+    tolerance = 1e-3 * float(np.max(high - low))
+    linear = tf.adaptive_field(part, tolerance)
+    mixed = tf.adaptive_field(part, tolerance, method="mixed")
+    counts = mixed.statistics()
+    assert 0 < counts["exact"] < counts["leaves"] < linear.statistics()["leaves"] / 3
+    points = _points(mixed)
+    truth, said = tf.Surface(part).distance(points), mixed.distance(points)
+    inside = np.isfinite(said)
+    assert (np.abs(said - truth)[inside] <= tolerance + 0.05 * np.abs(truth[inside]) + 1e-9).all()
+
+    middle, radius = part.vertices[7], 0.1 * float(np.max(high - low))
+    tool = csg.sphere(radius).translate(middle.tolist())
+    cut = mixed.carve(tool)
+    lower, upper = cut.bounds(points)
+    # Never less than either solid's distance; the same where the tool is far.
+    way = tool.distance(points)
+    assert (upper >= np.maximum(truth, -way) - 1e-9).all()
+    far = way > np.abs(truth)
+    assert (lower <= truth)[far].all()
+    assert (truth <= upper)[far].all()
+    cut.save(tmp_path / "cut.tfield")
+    assert np.array_equal(np.stack(tf.load(tmp_path / "cut.tfield").bounds(points)), np.stack([lower, upper]))
 
 
 @pytest.mark.parametrize(
@@ -114,7 +144,7 @@ def test_progress_is_told_and_can_stop() -> None:
 
 def test_any_number_of_threads_makes_the_same_field(part: tf.TriangleMesh) -> None:
     points = _points(tf.adaptive_field(part, 0.1))
-    for method in ("linear", "exact"):
+    for method in ("linear", "exact", "mixed"):
         fields = [tf.adaptive_field(part, 0.01, method=method, threads=n) for n in (1, 2, 5)]
         first, *others = (np.stack(field.bounds(points)) for field in fields)
         assert all(np.array_equal(first, other) for other in others)

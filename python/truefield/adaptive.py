@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 
-Method = Literal["linear", "cubic", "exact"]
+Method = Literal["linear", "cubic", "exact", "mixed"]
 Rule = Literal["verified", "samples"]
 Crossing = Literal["linear", "cubic"]
 
@@ -440,7 +440,8 @@ def adaptive_field(
             The tree is a cube around it.
         method: "linear" interpolates eight corners, "cubic" 64 samples where eight are not enough; "exact", for meshes,
             keeps the triangles that can be nearest (the complete field of Huang et al. 2001 inside the tree), and its
-            answers are exact.
+            answers are exact; "mixed", for meshes, interpolates where that is within the tolerance and keeps triangles
+            as soon as they are few: for fine tolerances, which take "linear" many small cells along edges.
         rule: "verified" divides until the error is proven; "samples" until the paper's 19 samples agree: quicker, with
             several times fewer leaves on scanned parts. `bounds` are proven with both.
         memory: refuse to take more bytes than this; half the machine's memory by default.

@@ -53,13 +53,15 @@ fn reconstruction(name: &str) -> PyResult<Reconstruction> {
     match name {
         "linear" => Ok(Reconstruction::Linear),
         "cubic" => Ok(Reconstruction::Cubic),
-        "exact" => Err(raise(Error::invalid("method \"exact\" is for meshes; choose \"linear\" or \"cubic\" for a shape"))),
+        "exact" | "mixed" => {
+            Err(raise(Error::invalid(format!("method {name:?} is for meshes; choose \"linear\" or \"cubic\" for a shape"))))
+        }
         _ => Err(unknown_method(name)),
     }
 }
 
 fn unknown_method(name: &str) -> PyErr {
-    raise(Error::invalid(format!("method is {name:?}; choose \"linear\", \"cubic\" or \"exact\"")))
+    raise(Error::invalid(format!("method is {name:?}; choose \"linear\", \"cubic\", \"exact\" or \"mixed\"")))
 }
 
 /// The rule that a name stands for.
@@ -105,7 +107,7 @@ impl PyAdaptiveField {
         Ok(Self::of(field))
     }
 
-    /// The field of a mesh, from its triangles: "linear" or "exact" leaves.
+    /// The field of a mesh, from its triangles: "linear", "exact" or "mixed" leaves.
     #[staticmethod]
     #[pyo3(signature = (surface, tolerance, growth, max_depth, domain, method, rule, memory, threads=None, progress=None))]
     fn of_surface(
@@ -125,6 +127,7 @@ impl PyAdaptiveField {
         let leaves = match method {
             "linear" => Leaves::Linear,
             "exact" => Leaves::Exact,
+            "mixed" => Leaves::Mixed,
             _ => return Err(unknown_method(method)),
         };
         let domain = domain.map(|(low, high)| Aabb::new(low.into(), high.into()));

@@ -74,9 +74,13 @@ fn bounds_hold_the_truth_of_every_nasty_mesh() {
             assert!(error.to_string().contains("scale it down"));
             continue;
         }
-        for (leaves, rule, growth) in
-            [(Leaves::Linear, Rule::Verified, 0.1), (Leaves::Linear, Rule::Samples, f64::INFINITY), (Leaves::Exact, Rule::Verified, 0.0)]
-        {
+        for (leaves, rule, growth) in [
+            (Leaves::Linear, Rule::Verified, 0.1),
+            (Leaves::Linear, Rule::Samples, f64::INFINITY),
+            (Leaves::Exact, Rule::Verified, 0.0),
+            (Leaves::Mixed, Rule::Verified, 0.1),
+            (Leaves::Mixed, Rule::Samples, 0.0),
+        ] {
             let rules = rules(&surface, 0.01, 5, growth, rule);
             holds(nasty.name, &build(&surface, leaves, &rules, 2), &surface, &rules, 4000);
         }
@@ -135,7 +139,7 @@ fn triangles_prove_more_than_the_mesh_as_any_shape() {
 #[test]
 fn trees_are_the_same_for_any_number_of_threads() {
     let surface = surface(shapes::welded(&shapes::scan(30, 30, 3)));
-    for leaves in [Leaves::Linear, Leaves::Exact] {
+    for leaves in [Leaves::Linear, Leaves::Exact, Leaves::Mixed] {
         let rules = rules(&surface, 5e-3, 7, 0.1, Rule::Verified);
         let one = build(&surface, leaves, &rules, 1).to_levels();
         for threads in [2, 3, 7] {

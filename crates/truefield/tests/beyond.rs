@@ -84,7 +84,7 @@ fn meshes_with_linear_and_exact_leaves() {
     let mesh = TriangleMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).expect("a mesh");
     let surface = Arc::new(Surface::new(Arc::new(mesh), SignChoice::Auto, &Run::default()).expect("a surface"));
     let root = root(&*surface, None, Division::Octree).expect("a domain");
-    for leaves in [Leaves::Linear, Leaves::Exact] {
+    for leaves in [Leaves::Linear, Leaves::Exact, Leaves::Mixed] {
         let field = adaptive_mesh(&surface, root, leaves, &Rules::within(0.02), &Run::default()).expect("a field");
         assert_eq!(field.coverage(), Coverage::Whole);
         check(&field, &*surface, 0.1, 6);

@@ -18,6 +18,7 @@ class Method(str, Enum):
     LINEAR = "linear"
     CUBIC = "cubic"
     EXACT = "exact"
+    MIXED = "mixed"
 
 
 class Rule(str, Enum):
@@ -41,7 +42,8 @@ def adaptive(
         int | None, typer.Option("--max-depth", show_default="none", help="No cell is divided at this depth.")
     ] = None,
     method: Annotated[
-        Method, typer.Option("--method", help="How leaves answer: from 8 corners, 64 samples, or their triangles.")
+        Method,
+        typer.Option("--method", help="How leaves answer: from 8 corners, 64 samples, their triangles, or what does."),
     ] = Method.LINEAR,
     rule: Annotated[
         Rule,

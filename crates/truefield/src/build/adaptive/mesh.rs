@@ -58,14 +58,16 @@ pub enum Leaves {
     Linear,
     /// By the triangles that can be nearest: the complete field inside the tree.
     Exact,
+    /// By interpolation where that is within the tolerance, else by the triangles as soon as they are few.
+    Mixed,
 }
 
 /// Builds the field of a mesh from its triangles; several times as quick as [`super::adaptive`], and proven more tightly.
 ///
-/// Exact leaves are divided until their lists are short; the tolerance does not matter to them.
+/// Exact leaves are divided until their lists are short; the tolerance does not matter to them. Mixed ones are divided until
+/// either is so, and a cell that is divided no more is exact where interpolation will not do.
 pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: &Rules, run: &Run<'_>) -> Result<AdaptiveField> {
     rules.check()?;
-    rules.check_rounding(&root)?;
     if root.division != Division::Octree {
         return Err(Error::invalid("a mesh is divided into an octree; a quadtree is for shapes that do not depend on z"));
     }
@@ -73,9 +75,10 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     if !(root.extent.diagonal() + surface.mesh().extent().diagonal() < f64::from(f32::MAX)) {
         return Err(Error::invalid("the part is so large that its distances do not fit single precision; scale it down"));
     }
+    rules.check_rounding(&root)?;
     let wanted = match leaves {
         // Half a diagonal of such a cell is within the tolerance.
-        Leaves::Linear => rules.tolerance,
+        Leaves::Linear | Leaves::Mixed => rules.tolerance,
         Leaves::Exact => {
             let mesh = surface.mesh();
             let area: f64 =
@@ -89,7 +92,7 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let scale = surface.scale();
     let lattice =
         Grid { origin: root.extent.min * scale, spacing: edge * scale * (-f64::from(depth)).exp2(), first: [0; 3], shape: [1 << depth; 3] };
-    let planes = if leaves == Leaves::Linear { Plane::all(surface) } else { Vec::new() };
+    let planes = if leaves == Leaves::Exact { Vec::new() } else { Plane::all(surface) };
     let job = Job { surface, planes: &planes, lattice: &lattice, depth, tiles, leaves, rules, cells: AtomicU64::new(0) };
     let parts = run.blocks("build the tree", 1 << (3 * tiles), |number| {
         let mut builder = Builder::new(&job);
@@ -112,7 +115,7 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     }
     derive_errors(&mut levels[..=tiles as usize], Division::Octree);
     let levels = Levels { coverage, levels, ..Levels::new(root, continuity, rules.accuracy()) };
-    AdaptiveField::from_levels(&levels, (leaves == Leaves::Exact).then(|| Arc::clone(surface)), run)
+    AdaptiveField::from_levels(&levels, (leaves != Leaves::Linear).then(|| Arc::clone(surface)), run)
 }
 
 /// What all tiles share.
@@ -231,7 +234,16 @@ impl<'a> Builder<'a> {
 
     /// Whether the corners alone prove a cell with linear leaves.
     fn is_proven(&self, seen: &Seen<'_>) -> bool {
-        self.job.leaves == Leaves::Linear && seen.is_within()
+        self.job.leaves != Leaves::Exact && seen.is_within()
+    }
+
+    /// How a leaf answers of which no more will be known.
+    fn kind(&self, seen: &Seen<'_>) -> LevelKind {
+        match self.job.leaves {
+            Leaves::Mixed if !seen.is_within() => LevelKind::Exact,
+            Leaves::Linear | Leaves::Mixed => LevelKind::Linear,
+            Leaves::Exact => LevelKind::Exact,
+        }
     }
 
     /// Judges a cell and, where it is a branch, its parts. `list` is complete, or empty where there is none.
@@ -245,10 +257,10 @@ impl<'a> Builder<'a> {
         if list.is_empty() && !proven && self.gather(&seen, LISTED, &mut own) {
             list = &own;
         }
-        if !proven && !list.is_empty() && self.job.leaves == Leaves::Linear {
+        if !proven && !list.is_empty() && self.job.leaves != Leaves::Exact {
             seen.known = self.prover.planes(&seen.at(None, list), seen.known).0;
         }
-        let done = self.push_leaf(&seen, list, run);
+        let done = self.push_leaf(&seen, self.kind(&seen), list, run);
         self.owned.push(own);
         done
     }
@@ -261,13 +273,17 @@ impl<'a> Builder<'a> {
 
     /// Judges a cell by the corners of its parts, and divides it where that is not enough.
     fn look_inside(&mut self, mut seen: Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
-        if self.job.leaves == Leaves::Exact && (1..=LIST).contains(&list.len()) {
-            // Nothing but its range is to be known of such a leaf.
+        if self.job.leaves != Leaves::Linear && (1..=LIST).contains(&list.len()) {
+            // Little more than its range is to be known of such a leaf.
             let ([x, y, z], tree) = (seen.start.node(CENTER), self.job.surface.tree());
             let center = self.job.lattice.corner(x, y, z);
             let squared = list.iter().fold(f64::INFINITY, |least, &slot| least.min(tree.facet_at(slot).distance_squared(center)));
             self.narrow(&mut seen, squared.sqrt());
-            return self.push_leaf(&seen, list, run);
+            if self.job.leaves == Leaves::Mixed {
+                seen.limit = self.allowed(&seen.start);
+                seen.known = self.prover.planes(&seen.at(None, list), seen.known).0;
+            }
+            return self.push_leaf(&seen, self.kind(&seen), list, run);
         }
         let mut own = self.owned.pop().unwrap_or_default();
         let few = list.is_empty() && self.gather(&seen, MOST, &mut own);
@@ -289,13 +305,21 @@ impl<'a> Builder<'a> {
         seen.limit = self.allowed(&seen.start);
         let mut parts = self.parts.pop().unwrap_or_default();
         parts.clear();
+        let few = (1..=LIST).contains(&list.len());
         let (leaf, lists) = match self.job.leaves {
-            Leaves::Exact => (seen.start.range.lower >= FAR * seen.cell.radius() || (1..=LIST).contains(&list.len()), None),
-            Leaves::Linear => self.prove(&mut seen, &mut halves, list, &mut parts),
+            Leaves::Exact => ((few || seen.start.range.lower >= FAR * seen.cell.radius()).then_some(LevelKind::Exact), None),
+            Leaves::Mixed if few => {
+                seen.known = self.prover.planes(&seen.at(Some(halves.corner(CENTER).foot), list), seen.known).0;
+                (Some(self.kind(&seen)), None)
+            }
+            Leaves::Linear | Leaves::Mixed => {
+                let (proven, lists) = self.prove(&mut seen, &mut halves, list, &mut parts);
+                (proven.then_some(LevelKind::Linear), lists)
+            }
         };
-        let done = if leaf {
+        let done = if let Some(kind) = leaf {
             self.lists.extend(lists);
-            self.push_leaf(&seen, list, run)
+            self.push_leaf(&seen, kind, list, run)
         } else {
             self.branch(&seen, &mut halves, list, lists, &mut parts, run)
         };
@@ -418,15 +442,13 @@ impl<'a> Builder<'a> {
     }
 
     /// Stores a leaf.
-    fn push_leaf(&mut self, seen: &Seen<'_>, list: &[Slot], run: &Run<'_>) -> Result<()> {
-        if self.job.leaves == Leaves::Linear {
-            self.push(seen, LevelKind::Linear, run)?;
-            return Ok(());
-        }
+    fn push_leaf(&mut self, seen: &Seen<'_>, kind: LevelKind, list: &[Slot], run: &Run<'_>) -> Result<()> {
         let tree = self.job.surface.tree();
-        let kept = if list.len() <= LONGEST { list } else { &[] };
-        let level = self.push(seen, LevelKind::Exact, run)?;
-        level.lists.add(list_side(seen.start.side), kept.iter().map(|&slot| tree.triangle(slot)));
+        let level = self.push(seen, kind, run)?;
+        if kind == LevelKind::Exact {
+            let kept = if list.len() <= LONGEST { list } else { &[] };
+            level.lists.add(list_side(seen.start.side), kept.iter().map(|&slot| tree.triangle(slot)));
+        }
         Ok(())
     }
 
