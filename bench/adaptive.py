@@ -122,6 +122,7 @@ def parts(threads: int, repeats: int, vertices: NDArray[np.float64], triangles: 
         ("linear, samples", {"growth": 0.05, "rule": "samples"}),
         ("linear, verified, surface only", {"growth": np.inf}),
         ("exact", {"method": "exact"}),
+        ("mixed, verified", {"growth": 0.05, "method": "mixed"}),
     ]
     for name, how in cases:
         peak = Peak()

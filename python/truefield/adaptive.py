@@ -192,8 +192,8 @@ class AdaptiveField:
             origins: (n, 3), or (3,) for all rays.
             directions: (n, 3), or (3,) for all rays, of any length but zero.
             method: "linear" takes the value to be linear along the way through a cell, as Frisken et al. 2000 do;
-                "cubic" finds the exact crossing of the trilinear interpolation. Tricubic and exact leaves are followed
-                step by step with both.
+                "cubic" finds the exact crossing of the trilinear interpolation. With both, exact leaves are met in
+                their triangles at distance 0; else they are followed step by step, as tricubic ones are.
             distance: of the surface, model units, negative inside.
             threads: worker threads; hits never depend on them.
             progress: called as `progress(phase, fraction)`.

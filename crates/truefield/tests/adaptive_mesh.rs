@@ -137,6 +137,53 @@ fn triangles_prove_more_than_the_mesh_as_any_shape() {
 }
 
 #[test]
+fn far_from_the_origin_no_cell_is_on_the_wrong_side() {
+    // Faces run through corners of cells, which rounding puts on either side.
+    let (radius, parts) = (0.95, 20);
+    for far in [10.1, 1000.7, 1e4 + 0.3, 1e6 + 0.1] {
+        let center = DVec3::new(far, -1.1 * far, 0.9 * far);
+        let mut soup = Vec::new();
+        for octant in 0..8u32 {
+            let sign = |axis: usize| if octant >> axis & 1 == 1 { -radius } else { radius };
+            let ends = [DVec3::X * sign(0), DVec3::Y * sign(1), DVec3::Z * sign(2)];
+            let turned = octant.count_ones() % 2 == 1;
+            let at = |i: u32, j: u32| {
+                let (s, t) = (f64::from(i) / f64::from(parts), f64::from(j) / f64::from(parts));
+                center + ends[0] * (1.0 - s - t) + ends[1] * s + ends[2] * t
+            };
+            let mut add = |[a, b, c]: [DVec3; 3]| soup.push(if turned { [a, c, b] } else { [a, b, c] });
+            for i in 0..parts {
+                for j in 0..parts - i {
+                    add([at(i, j), at(i + 1, j), at(i, j + 1)]);
+                    if i + j + 2 <= parts {
+                        add([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+                    }
+                }
+            }
+        }
+        let surface = surface(shapes::welded(&soup));
+        let place = root(&*surface, Some(Aabb::new(center - 2.0 * radius, center + 2.0 * radius)), Division::Octree).expect("a box");
+        for leaves in [Leaves::Linear, Leaves::Exact, Leaves::Mixed] {
+            let rules = Rules { max_depth: 8, ..Rules::within(4e-3) };
+            let field = adaptive_mesh(&surface, place, leaves, &rules, &Run::with_threads(2)).expect("a tree");
+            let (mut random, mut points) = (Random::new(31), Vec::new());
+            field.walk(&mut |cell| {
+                if cell.is_leaf() {
+                    points.push(random.within(&cell.extent()));
+                }
+                true
+            });
+            let bounds = field.bounds(&points, &Run::with_threads(2)).expect("answers");
+            for (p, bounds) in points.iter().zip(bounds) {
+                let outside = (*p - center).abs().element_sum() - radius;
+                let wrong = if outside > 0.0 { bounds.upper < 0.0 } else { bounds.lower > 0.0 };
+                assert!(!wrong || outside.abs() < 1e-6, "{leaves:?} at {p} of {center}: {bounds:?}, {outside} outside");
+            }
+        }
+    }
+}
+
+#[test]
 fn trees_are_the_same_for_any_number_of_threads() {
     let surface = surface(shapes::welded(&shapes::scan(30, 30, 3)));
     for leaves in [Leaves::Linear, Leaves::Exact, Leaves::Mixed] {

@@ -43,7 +43,7 @@ def adaptive(
     ] = None,
     method: Annotated[
         Method,
-        typer.Option("--method", help="How leaves answer: from 8 corners, 64 samples, their triangles, or what does."),
+        typer.Option("--method", help="Leaves answer by 8 corners, 64 samples, triangles, or corners and triangles."),
     ] = Method.LINEAR,
     rule: Annotated[
         Rule,

@@ -58,7 +58,9 @@ pub(super) fn nearest_of(surface: &Surface, p: DVec3, near: &[Corner; 8]) -> DVe
 
 /// The one side of a cell that the surface does not touch, where the side changes at the surface only.
 pub(super) fn one_side(corners: &[Corner; 8]) -> Option<Side> {
-    corners.iter().find(|corner| corner.certain).map(|corner| side_of(corner.value))
+    // The one that is farthest off: rounding may put others across.
+    let farther = |a: &&Corner, b: &&Corner| a.value.abs().total_cmp(&b.value.abs());
+    corners.iter().filter(|corner| corner.certain).max_by(farther).map(|corner| side_of(corner.value))
 }
 
 /// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
@@ -74,7 +76,7 @@ pub(super) fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner
 
 /// The side of a distance that is certain.
 pub(super) fn side_of(value: f64) -> Side {
-    if value < 0.0 { Side::Inside } else { Side::Outside }
+    if value.is_sign_negative() { Side::Inside } else { Side::Outside }
 }
 
 /// The one side of a ball that the surface does not touch, if that is certain.

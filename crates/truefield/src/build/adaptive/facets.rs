@@ -176,7 +176,7 @@ impl<'a> Prover<'a> {
     }
 
     /// Rounding of lengths within the cell and the surface.
-    fn slack(&self, cell: &Aabb) -> f64 {
+    pub fn slack(&self, cell: &Aabb) -> f64 {
         let tree = self.surface.tree();
         // A normal of the flattest triangle that is relied on is off by 1e-9; a cell's list may reach across the surface.
         let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(cell.min.abs()).max(cell.max.abs()).max_element();

@@ -201,7 +201,7 @@ impl<'a> Builder<'a> {
         let surface = self.job.surface;
         if start.side.is_none() && start.range.lower > 0.0 && !surface.side_changes_at_surface_only() {
             let center = corner(surface, cell.center(), corners, None);
-            start.side = side_of_ball(surface, &center, cell.radius() * (1.0 + 1e-12));
+            start.side = side_of_ball(surface, &center, cell.radius() * (1.0 + 1e-12) + self.prover.slack(cell));
         }
         start
     }
@@ -330,7 +330,7 @@ impl<'a> Builder<'a> {
 
     /// What follows for a cell from how far its centre is from the surface.
     fn narrow(&self, seen: &mut Seen<'_>, far: f64) {
-        let radius = seen.cell.radius() * (1.0 + 1e-12);
+        let radius = seen.cell.radius() * (1.0 + 1e-12) + self.prover.slack(&seen.cell);
         let start = seen.start.within(Range { lower: far - radius, upper: far + radius });
         seen.start = self.settle(self.look(start, &seen.cell, seen.corners), &seen.cell, seen.corners);
     }

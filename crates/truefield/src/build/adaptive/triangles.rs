@@ -91,14 +91,17 @@ fn above_tangents(facet: &Facet, row: &[f64; 8], places: &[DVec3; 8], told: &[f6
     high
 }
 
+/// Of a cell's diagonal: tangents at points nearer to a triangle are not relied on.
+const NEAR: f64 = 1e-2;
+
 /// What is told at the corners less the tangent of the distance to a triangle at `p`.
 #[inline(always)]
 fn under_tangent(facet: &Facet, p: DVec3, places: &[DVec3; 8], told: &[f64; 8]) -> [f64; 8] {
     let foot = facet.foot(p);
     let away = p - (facet.a + facet.ab * foot.s + facet.ac * foot.t);
     let distance = foot.distance_squared.sqrt();
-    // On the triangle there is no tangent; zero is below.
-    let (base, slope) = if distance > 0.0 { (distance, away / distance) } else { (0.0, DVec3::ZERO) };
+    // On the triangle there is no tangent, and next to it rounding turns it; zero is below.
+    let (base, slope) = if distance > NEAR * (places[7] - places[0]).length() { (distance, away / distance) } else { (0.0, DVec3::ZERO) };
     std::array::from_fn(|lane| told[lane] - (base + slope.dot(places[lane] - p)))
 }
 

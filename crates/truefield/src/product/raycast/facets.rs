@@ -20,10 +20,10 @@ const MOST: usize = 16;
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// Parts of a way that are told apart.
-const APART: f64 = 1e-9;
+const APART: f64 = 1e-7;
 
 /// A triangle along which the way runs, so that its place is not known to this part of the way, is not told from others.
-const VAGUE: f64 = 1e-3;
+const VAGUE: f64 = APART;
 
 /// What a way through a leaf meets.
 pub(super) struct Through {

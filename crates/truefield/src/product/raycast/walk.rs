@@ -209,7 +209,8 @@ impl Caster {
                         let at = At::Other(number);
                         let begin = since.unwrap_or(t);
                         let way = [begin, out].map(|t| prepared.start + prepared.unit * t);
-                        let entered = since.map(|_| carried < 0.0);
+                        // What was left of the leaf before may pass triangles that this one does not know.
+                        let entered = since.filter(|&since| since >= t).map(|_| carried < 0.0);
                         if let Some(Through { entered, change, until }) = self.through(&self.others[number as usize], way, entered) {
                             if !carried.is_nan() && (carried < 0.0) != entered {
                                 return Some(Found { t, at });

@@ -28,10 +28,10 @@ use crate::geom::DVec3;
 use crate::run::Run;
 use crate::source::mesh::{SignKind, Surface};
 
-/// Samples a worker measures in one go: some milliseconds of work.
 /// Of the diagonal of a part: a tolerance that tells whether it has an inside.
 const FINE: f64 = 1e-3;
 
+/// Samples a worker measures in one go: some milliseconds of work.
 const CHUNK: usize = 256;
 
 /// What to find out about a part. Lengths in model units; limits are limits on wall thickness.

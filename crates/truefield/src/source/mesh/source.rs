@@ -77,6 +77,8 @@ struct Ball {
 impl Surface {
     fn ball(&self, cell: &Aabb) -> Ball {
         let (center, radius) = (cell.center() * self.scale, cell.radius() * self.scale * (1.0 + 1e-12));
+        // Corners and centre are rounded, far from the origin by more than that.
+        let radius = radius + ROUNDING * (self.tree.radius + self.tree.center.abs().max_element() + center.abs().max_element());
         let found = self.tree.nearest(center, Candidate::within(f64::INFINITY));
         let foot = self.tree.facet(found.triangle).nearest(center);
         let distance = foot.distance_squared.sqrt();

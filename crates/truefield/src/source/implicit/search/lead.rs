@@ -22,7 +22,6 @@ impl Search<'_> {
             self.started = Some(there);
             self.sheet(bound, there, foot.point);
         }
-        self.above.clear();
     }
 
     /// The leaf below a node to which the least of some number leads.

@@ -141,6 +141,8 @@ impl<'a> Search<'a> {
     pub(super) fn run(mut self) -> Found {
         if let Some(root) = self.boxes.root() {
             self.start(root);
+            // What led to the first leaf says nothing of others.
+            self.above.clear();
             self.open(root);
         }
         while let Some(Waiting { bound, item, .. }) = self.heap.pop() {

@@ -37,6 +37,7 @@ impl Search<'_> {
         if self.holds(&foot.proof(&here, self.p, sheet, extent)) && self.is_proven(cell) {
             // What holds around the leaf may hold far around it.
             while let Some((_, sheet)) = self.above.pop().and_then(|above| self.boxes.content(&self.boxes.nodes[above as usize]))
+                && sheet.extent.contains(foot.point)
                 && self.holds(&foot.proof(&here, self.p, sheet, &sheet.extent))
             {}
             return true;
