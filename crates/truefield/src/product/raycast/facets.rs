@@ -9,7 +9,6 @@ use crate::bvh::cover::{Range, Scratch, gather};
 use crate::bvh::tree::Slot;
 use crate::field::Continuity;
 use crate::field::adaptive::{AdaptiveField, Cell, Leaf};
-
 use crate::geom::{Aabb, DVec3, Facet, triangle_overlaps_box};
 use crate::source::mesh::Surface;
 

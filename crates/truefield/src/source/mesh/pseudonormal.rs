@@ -209,8 +209,8 @@ impl Pseudonormals {
             let (gap, slope) = (f64::from(gap), f64::from(slope));
             gap > 2.0 * near && beyond_edges(facet, nearest, slope, 2.0 * near + slope * near)
         };
-        let near = nearest.feature == Feature::Face && nearest.distance_squared <= 64.0 * off * off;
-        near && self.room.get(triangle as usize).is_some_and(whole)
+        let on_face = nearest.feature == Feature::Face && nearest.distance_squared <= 64.0 * off * off;
+        on_face && self.room.get(triangle as usize).is_some_and(whole)
     }
 }
 
