@@ -55,6 +55,14 @@ def test_bad_parts(truefield: Command, folder: Path, command: str, bad: tuple[st
     assert not list((folder / "out").iterdir())
 
 
+@pytest.mark.parametrize("command", [command for command in LINES if command != "info"])
+def test_empty_names(truefield: Command, folder: Path, monkeypatch: pytest.MonkeyPatch, command: str) -> None:
+    monkeypatch.chdir(folder / "out")
+    assert "the name is empty" in truefield.refused(*line(command, folder, output=""))
+    assert "the name is empty" in truefield.refused(*line(command, folder)[:1], "", *line(command, folder)[2:])
+    assert not list((folder / "out").iterdir())
+
+
 @pytest.mark.parametrize("command", LINES)
 @pytest.mark.parametrize("missing", ["none.stl", "none.step", "."])
 def test_missing_parts(truefield: Command, folder: Path, command: str, missing: str) -> None:

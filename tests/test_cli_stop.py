@@ -76,3 +76,12 @@ def test_ctrl_c_while_starting_is_no_traceback() -> None:
     code += "typer.echo = lambda *_: os.kill(os.getpid(), signal.SIGINT); raise SystemExit(main(['--version']))"
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr.strip()) == (130, "", "truefield: stopped")
+
+
+def test_ctrl_c_while_importing_is_no_traceback(tmp_path: Path) -> None:
+    # The first import of the package is where Python spends its start.
+    (tmp_path / "numpy.py").write_text("import os, signal, time; os.kill(os.getpid(), signal.SIGINT); time.sleep(9)")
+    code = "from truefield_command import main; raise SystemExit(main())"
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    ended = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr.strip()) == (130, "", "truefield: stopped")

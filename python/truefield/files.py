@@ -72,7 +72,7 @@ def replacing_folder(path: PathLike) -> Iterator[Path]:
 
 def check_file(path: PathLike) -> None:
     """Raises `FileError` if a file at `path` could not be written; for asking before a long job."""
-    target = Path(path)
+    target = _named(path)
     if target.is_dir():
         raise FileError(f"cannot write {_shown(path)}: it is a folder; give the name of a file")
     _check_parent(target)
@@ -80,12 +80,19 @@ def check_file(path: PathLike) -> None:
 
 def check_folder(path: PathLike) -> None:
     """Raises `FileError` if a folder at `path` could not be written; for asking before a long job."""
-    target = Path(path)
+    target = _named(path)
     if target.exists() and not target.is_dir():
         raise FileError(f"cannot write into {_shown(path)}: it is a file; give the name of a folder")
     _check_parent(target.resolve())
     if target.is_dir() and not os.access(target, os.W_OK | os.X_OK):
         raise FileError(f"cannot write into {_shown(path)}: permission denied; choose another folder")
+
+
+def _named(path: PathLike) -> Path:
+    # The empty name would be the current folder's.
+    if not os.fspath(path):
+        raise FileError("cannot write: the name is empty; give the path of a file or folder")
+    return Path(path)
 
 
 def _check_parent(target: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import FIELD_SUFFIX, Part, Sign, SignRule, Threads, Weld, load
+from truefield.cli.options import FIELD_SUFFIX, Part, Sign, SignRule, Threads, Weld, load, path
 from truefield.cli.progress import progress
 
 
@@ -34,7 +34,9 @@ def adaptive(
     tolerance: Annotated[
         float, typer.Option("--tolerance", show_default=False, help="The largest error at the surface, in model units.")
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", show_default=False, help="What to write: .tfield.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", show_default=False, parser=path, help="What to write: .tfield.")
+    ],
     growth: Annotated[
         float, typer.Option("--growth", help="How much the error may grow per unit of distance from the surface.")
     ] = 0.05,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, ready
+from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, path, ready
 from truefield.cli.progress import progress
 
 
@@ -31,7 +31,7 @@ def contour(
         typer.Option("--tolerance", show_default=False, help="The largest error and the largest gap, in model units."),
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", show_default=False, help="What to write: .ply, .csv or .xyz.")
+        Path, typer.Option("--output", "-o", show_default=False, parser=path, help="What to write: .ply, .csv or .xyz.")
     ],
     placement: Annotated[
         Placement,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, ready
+from truefield.cli.options import Askable, Sign, SignRule, Threads, Weld, path, ready
 from truefield.cli.progress import progress
 
 
@@ -17,11 +17,18 @@ def distance(
     points: Annotated[
         Path,
         typer.Option(
-            "--points", "-p", show_default=False, help="The points: .csv, .xyz, .txt (x, y, z), .npy or .ply."
+            "--points",
+            "-p",
+            show_default=False,
+            parser=path,
+            help="The points: .csv, .xyz, .txt (x, y, z), .npy or .ply.",
         ),
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", show_default=False, help="What to write: a .csv or .ply, one row a point.")
+        Path,
+        typer.Option(
+            "--output", "-o", show_default=False, parser=path, help="What to write: a .csv or .ply, one row a point."
+        ),
     ],
     sign: SignRule = Sign.AUTO,
     weld: Weld = None,

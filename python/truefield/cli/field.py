@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import FIELD_SUFFIX, Part, Sign, SignRule, Threads, Weld, load
+from truefield.cli.options import FIELD_SUFFIX, Part, Sign, SignRule, Threads, Weld, load, path
 from truefield.cli.progress import progress
 
 
@@ -22,7 +22,9 @@ class Region(str, Enum):
 def field(
     part: Part,
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", show_default=False, help="What to write: a .tfield.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", show_default=False, parser=path, help="What to write: a .tfield.")
+    ],
     resolution: Annotated[
         int | None, typer.Option("--resolution", show_default="128", help="Cells along the longest side.")
     ] = None,

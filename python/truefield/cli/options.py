@@ -17,6 +17,13 @@ if TYPE_CHECKING:
 FIELD_SUFFIX: Final = ".tfield"
 
 
+def path(given: str) -> Path:
+    """The path that a word names; the empty word, as of a shell's unset variable, would name the current folder."""
+    if not given:
+        raise typer.BadParameter("the name is empty; give the path of a file or folder")
+    return Path(given)
+
+
 class Sign(str, Enum):
     """How inside is told from outside."""
 
@@ -28,7 +35,9 @@ class Sign(str, Enum):
 
 Part = Annotated[
     Path,
-    typer.Argument(metavar="PART", show_default=False, help="A mesh: .stl, .obj, .ply, .off, .glb, .gltf or .3mf."),
+    typer.Argument(
+        metavar="PART", show_default=False, parser=path, help="A mesh: .stl, .obj, .ply, .off, .glb, .gltf or .3mf."
+    ),
 ]
 SignRule = Annotated[
     Sign, typer.Option("--sign", help="How inside is told from outside; `auto` looks at the mesh and says why.")
@@ -53,16 +62,19 @@ Written = Annotated[
         "--output",
         "-o",
         show_default=False,
+        parser=path,
         help="What to write: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif or .zarr.",
     ),
 ]
 
 
 Lower = Annotated[
-    Path | None, typer.Option("--lower", show_default=False, help="Also write lower bounds of the distances here.")
+    Path | None,
+    typer.Option("--lower", show_default=False, parser=path, help="Also write lower bounds of the distances here."),
 ]
 Upper = Annotated[
-    Path | None, typer.Option("--upper", show_default=False, help="Also write upper bounds of the distances here.")
+    Path | None,
+    typer.Option("--upper", show_default=False, parser=path, help="Also write upper bounds of the distances here."),
 ]
 
 
@@ -71,6 +83,7 @@ Askable = Annotated[
     typer.Argument(
         metavar="PART",
         show_default=False,
+        parser=path,
         help="A mesh: .stl, .obj, .ply, .off, .glb, .gltf or .3mf; or a field: .tfield.",
     ),
 ]

@@ -7,16 +7,20 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Threads
+from truefield.cli.options import Threads, path
 from truefield.cli.progress import progress
 
 _SAMPLES = (1, 9, 25)
 
 
 def render(
-    field: Annotated[Path, typer.Argument(metavar="FIELD", show_default=False, help="An adaptive field: .tfield.")],
+    field: Annotated[
+        Path, typer.Argument(metavar="FIELD", show_default=False, parser=path, help="An adaptive field: .tfield.")
+    ],
     *,
-    output: Annotated[Path, typer.Option("--output", "-o", show_default=False, help="The picture to write: .png.")],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", show_default=False, parser=path, help="The picture to write: .png.")
+    ],
     view: Annotated[
         str,
         typer.Option(

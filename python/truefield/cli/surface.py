@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truefield.cli.options import FIELD_SUFFIX, Threads
+from truefield.cli.options import FIELD_SUFFIX, Threads, path
 from truefield.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -29,12 +29,16 @@ def surface(
         typer.Argument(
             metavar="FIELD",
             show_default=False,
+            parser=path,
             help="Distances: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif, .zarr; or a field: .tfield.",
         ),
     ],
     *,
     output: Annotated[
-        Path, typer.Option("--output", "-o", show_default=False, help="What to write: .stl, .obj, .ply or .off.")
+        Path,
+        typer.Option(
+            "--output", "-o", show_default=False, parser=path, help="What to write: .stl, .obj, .ply or .off."
+        ),
     ],
     distance: Annotated[
         float,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from truefield.cli.options import Part, Sign, SignRule, Threads, Weld, load
+from truefield.cli.options import Part, Sign, SignRule, Threads, Weld, load, path
 from truefield.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -21,7 +21,10 @@ def thickness(
     part: Part,
     *,
     output: Annotated[
-        Path, typer.Option("--output", "-o", show_default=False, help="The folder for the report; made if need be.")
+        Path,
+        typer.Option(
+            "--output", "-o", show_default=False, parser=path, help="The folder for the report; made if need be."
+        ),
     ],
     tolerance: Annotated[
         float | None,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Lower, Threads, Upper, Written, check_apart
+from truefield.cli.options import Lower, Threads, Upper, Written, check_apart, path
 from truefield.cli.progress import progress
 
 
@@ -42,6 +42,7 @@ def transform(
         typer.Argument(
             metavar="IMAGE",
             show_default=False,
+            parser=path,
             help="An image or volume: .nrrd, .nii, .nii.gz, .vti, .npz, .npy, .tif, .png or .zarr.",
         ),
     ],
@@ -83,9 +84,9 @@ def transform(
         raise tf.TruefieldError("--threshold is nan; give a number")
     image = tf.read_volume(volume)
     result = image.holding(np.broadcast_to(np.float32(0), image.shape))
-    for path in (output, lower, upper):
-        if path is not None:
-            check(path, result)
+    for wanted in (output, lower, upper):
+        if wanted is not None:
+            check(wanted, result)
     values = image.values if threshold is None else image.values > threshold
     bounds = lower is not None or upper is not None
     with progress() as report:
@@ -106,9 +107,9 @@ def transform(
         )
     distances = np.asarray(made)
     image.holding(distances).write(output)
-    for path, bound in ((lower, "lower"), (upper, "upper")):
-        if path is not None:
-            image.holding(getattr(made, bound)).write(path)
+    for wanted, bound in ((lower, "lower"), (upper, "upper")):
+        if wanted is not None:
+            image.holding(getattr(made, bound)).write(wanted)
     counts = " x ".join(map(str, image.shape))
     inside = int(np.count_nonzero(values))
     typer.echo(f"{output}: {counts} samples, {inside} in the foreground, distances to {float(distances.max()):.6g}")
