@@ -82,7 +82,11 @@ impl Cloud<'_> {
             let mut list = Vec::new();
             if gather_few(self.tree, &part.cell, &[witness], SEARCH * count, &mut self.scratch, &mut list) {
                 // One witness made it; eight make it much shorter.
-                return if list.len() > SHORT { self.share(&[part], &list) } else { self.shorten(part, &list) };
+                if list.len() <= SHORT {
+                    return self.shorten(part, &list);
+                }
+                let (parts, count) = self.halves(part, 2);
+                return self.share(&parts[..count], &list);
             }
         }
         let (parts, count) = self.halves(part, 2);

@@ -43,7 +43,8 @@ const PAIRS: usize = OCTANTS / 2;
 /// Memory that is used again from box to box.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    rows: Vec<[[f32; LANES]; PAIRS]>,
+    /// By triangle of a list and pair of boxes.
+    rows: Vec<[f32; LANES]>,
     stack: Vec<u32>,
 }
 
@@ -174,29 +175,24 @@ fn refine_body<F: Fuse>(
     let pairs = cells.len().div_ceil(2);
     let rows = &mut scratch.rows;
     rows.clear();
+    rows.reserve(list.len() * pairs);
     let mut least = [[f32::INFINITY; LANES]; PAIRS];
     // Position in the list, as a float so that both are chosen by one kind of instruction.
     let mut nearest = [[0.0f32; LANES]; PAIRS];
     for (position, &slot) in list.iter().enumerate() {
         let (frame, position) = (tree.frame_at(slot), position as f32);
-        let mut row = [[0.0; LANES]; PAIRS];
         for pair in 0..pairs {
-            frame.distances_squared::<F, LANES>(center, &offsets[pair], &mut row[pair]);
-            let (mut low, mut at) = (least[pair], nearest[pair]);
-            for lane in 0..LANES {
-                let nearer = row[pair][lane] < low[lane];
-                low[lane] = if nearer { row[pair][lane] } else { low[lane] };
-                at[lane] = if nearer { position } else { at[lane] };
-            }
-            (least[pair], nearest[pair]) = (low, at);
+            let mut row = [0.0; LANES];
+            frame.distances_squared::<F, LANES>(center, &offsets[pair], &mut row);
+            F::keep_least(&row, position, &mut least[pair], &mut nearest[pair]);
+            rows.push(row);
         }
-        rows.push(row);
     }
     let mut ranges = [Range::ALL; OCTANTS];
-    if let (&[only], [row]) = (list, rows.as_slice()) {
+    if let &[only] = list {
         // Nothing to drop; and the distance to one triangle is convex, so largest at a corner.
         for (i, (out, range)) in out.iter_mut().zip(&mut ranges).enumerate().take(cells.len()) {
-            let corners = &row[i / 2][i % 2 * CORNERS..][..CORNERS];
+            let corners = &rows[i / 2][i % 2 * CORNERS..][..CORNERS];
             let (low, high) = corners.iter().fold((f32::INFINITY, 0.0f32), |(low, high), &d| (low.min(d), high.max(d)));
             let error = f64::from(error);
             let lower = f64::from(low.sqrt()) - error - cells[i].radius();
@@ -210,43 +206,38 @@ fn refine_body<F: Fuse>(
         let offsets = &offsets[pair];
         // Squared distances from every corner to every witness of its box, too large rather than too small by all errors.
         let mut reach = [[0.0f32; LANES]; CORNERS];
-        let mut farthest = [[0.0f32; LANES]; CORNERS];
-        let witnesses = feet(tree, list, &nearest[pair], offsets, center);
-        for witness in 0..CORNERS {
-            let q = |axis: usize, lane: usize| witnesses[axis][lane / CORNERS * CORNERS + witness];
+        let mut farthest = [0.0f32; LANES];
+        let [wx, wy, wz] = feet(tree, list, &nearest[pair], offsets, center);
+        for (corner, reach) in reach.iter_mut().enumerate() {
             for lane in 0..LANES {
-                let (x, y, z) = (offsets.x[lane] - q(0, lane), offsets.y[lane] - q(1, lane), offsets.z[lane] - q(2, lane));
+                let at = lane / CORNERS * CORNERS + corner;
+                let (x, y, z) = (offsets.x[at] - wx[lane], offsets.y[at] - wy[lane], offsets.z[at] - wz[lane]);
                 let distance = (x * x + y * y + z * z).sqrt() + 2.0 * error;
-                farthest[witness][lane] = distance;
-                reach[witness][lane] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
+                farthest[lane] = if distance > farthest[lane] { distance } else { farthest[lane] };
+                reach[lane] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
             }
         }
         let [first, second] = [2 * pair, 2 * pair + 1];
         let (left, right) = out.split_at_mut(second);
         let (left, right) = (&mut left[first], &mut right[0]);
-        left.clear();
-        right.clear();
-        for (&slot, row) in list.iter().zip(rows.iter()) {
-            // A witness that is nearer than the triangle from all corners of a box leaves no bit of its half.
-            let (mut low, mut high) = (true, true);
-            for witness in &reach {
-                let mask = F::mask_not_above(&row[pair], witness);
-                low &= mask & 0xff != 0;
-                high &= mask & 0xff00 != 0;
-            }
-            if low {
-                left.push(slot);
-            }
-            if high {
-                right.push(slot);
-            }
+        for out in [&mut *left, &mut *right] {
+            out.clear();
+            out.resize(list.len(), Slot(0));
         }
+        let mut kept = (0, 0);
+        for (&slot, row) in list.iter().zip(rows[pair..].iter().step_by(pairs)) {
+            // Kept without a branch, which nothing could foretell.
+            (left[kept.0], right[kept.1]) = (slot, slot);
+            let (low, high) = F::each_reached(row, &reach);
+            kept = (kept.0 + usize::from(low), kept.1 + usize::from(high));
+        }
+        left.truncate(kept.0);
+        right.truncate(kept.1);
         for (half, octant) in [first, second].into_iter().enumerate() {
             let lanes = half * CORNERS..(half + 1) * CORNERS;
             let nearest = least[pair][lanes.clone()].iter().fold(f32::INFINITY, |a, &b| a.min(b)).sqrt();
             let lower = f64::from(nearest) - f64::from(error) - cell(octant).radius();
-            let span = |far: &[f32; LANES]| far[lanes.clone()].iter().fold(0.0f32, |a, &b| a.max(b));
-            let upper = farthest.iter().map(span).fold(f32::INFINITY, f32::min);
+            let upper = farthest[lanes].iter().fold(f32::INFINITY, |a, &b| a.min(b));
             ranges[octant] = Range { lower: lower.max(0.0), upper: f64::from(upper) };
         }
     }
