@@ -41,12 +41,8 @@ pub(crate) trait Fuse: Copy {
         (!beyond[..8].contains(&true), !beyond[8..].contains(&true))
     }
 
-    /// Lane i: that of `a` which `lanes[i]` names, modulo 32.
-    #[inline(always)]
-    fn pick(a: &[[f32; 16]; 2], lanes: &[u32; 16]) -> [f32; 16] {
-        let a = a.as_flattened();
-        std::array::from_fn(|i| a[(lanes[i] % 32) as usize])
-    }
+    /// Whether any `a[i] < 0`, of numbers that are neither -0 nor none.
+    fn any_negative(a: &[f32; 8]) -> bool;
 }
 
 /// Two roundings: any machine.
@@ -71,6 +67,11 @@ impl Fuse for Plain {
     #[inline(always)]
     fn any_above(a: &[u32; 16], limit: u32) -> bool {
         a.iter().fold(false, |any, &a| any | (a > limit))
+    }
+
+    #[inline(always)]
+    fn any_negative(a: &[f32; 8]) -> bool {
+        a.iter().fold(false, |any, &a| any | (a < 0.0))
     }
 }
 
@@ -129,6 +130,13 @@ impl Fuse for Avx2 {
             let same = intrinsics::_mm256_cmpeq_epi32(intrinsics::_mm256_max_epu32(intrinsics::_mm256_max_epu32(low, high), limit), limit);
             intrinsics::_mm256_movemask_epi8(same) != -1
         }
+    }
+
+    #[inline(always)]
+    #[allow(unsafe_code)]
+    fn any_negative(a: &[f32; 8]) -> bool {
+        // SAFETY: AVX2 was detected; the array is eight floats, and loads need no alignment.
+        unsafe { intrinsics::_mm256_movemask_ps(intrinsics::_mm256_loadu_ps(a.as_ptr())) != 0 }
     }
 }
 
@@ -199,15 +207,9 @@ impl Fuse for Avx512 {
 
     #[inline(always)]
     #[allow(unsafe_code)]
-    fn pick(a: &[[f32; 16]; 2], lanes: &[u32; 16]) -> [f32; 16] {
-        let mut out = [0.0; 16];
-        // SAFETY: AVX-512 was detected; all arrays are sixteen words, and neither loads nor stores need alignment.
-        unsafe {
-            let (low, high) = (intrinsics::_mm512_loadu_ps(a[0].as_ptr()), intrinsics::_mm512_loadu_ps(a[1].as_ptr()));
-            let picked = intrinsics::_mm512_permutex2var_ps(low, intrinsics::_mm512_loadu_si512(lanes.as_ptr().cast()), high);
-            intrinsics::_mm512_storeu_ps(out.as_mut_ptr(), picked);
-        }
-        out
+    fn any_negative(a: &[f32; 8]) -> bool {
+        // SAFETY: AVX-512 was detected; the array is eight floats, and loads need no alignment.
+        unsafe { intrinsics::_mm256_movemask_ps(intrinsics::_mm256_loadu_ps(a.as_ptr())) != 0 }
     }
 }
 

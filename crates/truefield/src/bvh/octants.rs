@@ -46,6 +46,9 @@ const PICK: [[u8; CORNERS]; OCTANTS] = {
     pick
 };
 
+/// The lanes of the corners of the cell itself.
+const OUTER: [u8; CORNERS] = [0, 1, 2, 3, 4, 5, 6, 7];
+
 /// The number of a corner of an octant.
 pub(crate) const fn node(octant: usize, corner: usize) -> usize {
     let x = (octant & 1) + (corner & 1);
@@ -64,7 +67,6 @@ pub(crate) struct Octants {
     /// Squared distances to each triangle of the list.
     rows: Vec<[[f32; LANES]; PARTS]>,
     feet: Feet,
-    spare: Vec<Slot>,
 }
 
 impl Default for Octants {
@@ -76,7 +78,6 @@ impl Default for Octants {
             offsets: std::array::from_fn(|_| Offsets::from_fn(|_| DVec3::ZERO)),
             rows: Vec::new(),
             feet: Feet::default(),
-            spare: Vec::new(),
         }
     }
 }
@@ -91,7 +92,7 @@ impl Octants {
     /// [`Self::measure`], dropping from the list what the nearest points of the cell's corners rule out.
     pub fn shorten(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES], feet: &[DVec3; CORNERS], list: &mut Vec<Slot>) {
         self.place(tree, cell, nodes);
-        let reach = reaches(self, &[std::array::from_fn(|corner| corner as u8); 2], &[*feet; 2]);
+        let reach = reaches(self, OUTER, feet);
         shorten(tree, self, &reach, list);
     }
 
@@ -111,35 +112,26 @@ impl Octants {
     /// Fills `out` with the complete lists of those octants that are `wanted`, a bit for each, from the nearest points of all
     /// nodes, which have to be answered; keeps the list's order.
     pub fn split(&mut self, wanted: u8, feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; OCTANTS]) {
-        let mut octants = (0..OCTANTS).filter(|octant| wanted >> octant & 1 == 1);
-        while let Some(first) = octants.next() {
-            let second = octants.next();
+        for (octant, out) in out.iter_mut().enumerate().filter(|(octant, _)| wanted >> octant & 1 == 1) {
             if list.len() > 1 {
-                let mut lists =
-                    [std::mem::take(&mut out[first]), std::mem::take(second.map_or(&mut self.spare, |second| &mut out[second]))];
-                split(self, [first, second.unwrap_or(first)], feet, list, &mut lists);
-                let [low, high] = lists;
-                out[first] = low;
-                *second.map_or(&mut self.spare, |second| &mut out[second]) = high;
-                continue;
-            }
-            for octant in [Some(first), second].into_iter().flatten() {
-                out[octant].clear();
-                out[octant].extend(list);
+                split(self, octant, feet, list, out);
+            } else {
+                out.clear();
+                out.extend(list);
             }
         }
     }
 }
 
-/// By witness: squared distances from the corners of two octants that a triangle must not exceed to stay.
-type Reach = [[f32; LANES]; CORNERS];
+/// By corner, for each witness: squared distances that a triangle must not exceed to stay.
+type Reach = [[f32; CORNERS]; CORNERS];
 
 multiversion!(fn measure(tree: &Tree, octants: &mut Octants, list: &[Slot]) = measure_body);
 multiversion!(fn shorten(tree: &Tree, octants: &mut Octants, reach: &Reach, list: &mut Vec<Slot>) = shorten_body);
 multiversion!(fn nearest(tree: &Tree, octants: &mut Octants, list: &[Slot]) = nearest_body);
 multiversion!(
-    /// The lists of two octants.
-    fn split(octants: &Octants, pair: [usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; 2]) = split_body
+    /// The list of an octant.
+    fn split(octants: &Octants, octant: usize, feet: &[DVec3; NODES], list: &[Slot], out: &mut Vec<Slot>) = split_body
 );
 
 #[inline(always)]
@@ -157,35 +149,34 @@ fn measure_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
 
 /// Too large rather than too small by all errors: those of the rows, of the places and of the witnesses.
 #[inline(always)]
-fn reaches(octants: &Octants, lanes: &[[u8; CORNERS]; 2], feet: &[[DVec3; CORNERS]; 2]) -> Reach {
-    let offsets = Offsets::<LANES>::from_fn(|lane| {
-        let at = usize::from(lanes[lane / CORNERS][lane % CORNERS]);
-        octants.points[at] - octants.base
-    });
-    let mut reach = [[0.0f32; LANES]; CORNERS];
-    for (witness, reach) in reach.iter_mut().enumerate() {
-        let q = [feet[0][witness] - octants.base, feet[1][witness] - octants.base];
-        for lane in 0..LANES {
-            let q = q[lane / CORNERS];
-            let (x, y, z) = (offsets.x[lane] - q.x as f32, offsets.y[lane] - q.y as f32, offsets.z[lane] - q.z as f32);
+fn reaches(octants: &Octants, lanes: [u8; CORNERS], feet: &[DVec3; CORNERS]) -> Reach {
+    let q = Offsets::<CORNERS>::from_fn(|witness| feet[witness] - octants.base);
+    let mut reach = [[0.0f32; CORNERS]; CORNERS];
+    for (lane, reach) in lanes.into_iter().zip(&mut reach) {
+        let (offsets, lane) = (&octants.offsets[usize::from(lane) / LANES], usize::from(lane) % LANES);
+        for witness in 0..CORNERS {
+            let (x, y, z) = (offsets.x[lane] - q.x[witness], offsets.y[lane] - q.y[witness], offsets.z[lane] - q.z[witness]);
             let distance = (x * x + y * y + z * z).sqrt() + 2.0 * octants.error;
-            reach[lane] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
+            reach[witness] = distance * distance * (1.0 + 8.0 * f32::EPSILON);
         }
     }
     reach
 }
 
-/// Whether a triangle stays in the lists of two octants, 1 or 0: each witness leaves a corner's bit.
+/// Whether a triangle stays in the list of a cell with corners in these lanes, 1 or 0: it does where no witness is nearer to all corners.
 #[inline(always)]
-fn stays<F: Fuse>(row: &[f32; LANES], reach: &Reach) -> (usize, usize) {
-    let (mut low, mut high) = (true, true);
+fn stays<F: Fuse>(row: &[[f32; LANES]; PARTS], lanes: [u8; CORNERS], reach: &Reach) -> usize {
+    let row = row.as_flattened();
     // Without a branch, which nothing could foretell.
-    for witness in reach {
-        let mask = F::mask_not_above(row, witness);
-        low &= mask & 0xff != 0;
-        high &= mask & 0xff00 != 0;
+    let mut room = [f32::NEG_INFINITY; CORNERS];
+    for (lane, reach) in lanes.into_iter().zip(reach) {
+        let squared = row[usize::from(lane) % (PARTS * LANES)];
+        for witness in 0..CORNERS {
+            let left = reach[witness] - squared;
+            room[witness] = if left > room[witness] { left } else { room[witness] };
+        }
     }
-    (usize::from(low), usize::from(high))
+    usize::from(!F::any_negative(&room))
 }
 
 #[inline(always)]
@@ -198,7 +189,7 @@ fn shorten_body<F: Fuse>(tree: &Tree, octants: &mut Octants, reach: &Reach, list
         let (slot, mut row) = (list[at], [[0.0; LANES]; PARTS]);
         tree.frame_at(slot).distances_squared::<F, LANES>(*base, &offsets[0], &mut row[0]);
         list[kept] = slot;
-        kept += stays::<F>(&row[0], reach).0;
+        kept += stays::<F>(&row, OUTER, reach);
         rows.push(row);
         rows.truncate(kept);
     }
@@ -235,27 +226,17 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
 }
 
 #[inline(always)]
-fn split_body<F: Fuse>(octants: &Octants, pair: [usize; 2], feet: &[DVec3; NODES], list: &[Slot], out: &mut [Vec<Slot>; 2]) {
-    let lanes = [PICK[pair[0]], PICK[pair[1]]];
-    let mut around = [[DVec3::ZERO; CORNERS]; 2];
-    for lane in 0..LANES {
-        around[lane / CORNERS][lane % CORNERS] = feet[node(pair[lane / CORNERS], lane % CORNERS)];
-    }
-    let reach = reaches(octants, &lanes, &around);
-    for out in out.iter_mut() {
-        out.clear();
-        out.resize(list.len(), Slot(0));
-    }
-    let [left, right] = out;
-    let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane / CORNERS][lane % CORNERS]));
-    let mut kept = (0, 0);
+fn split_body<F: Fuse>(octants: &Octants, octant: usize, feet: &[DVec3; NODES], list: &[Slot], out: &mut Vec<Slot>) {
+    let lanes = PICK[octant];
+    let reach = reaches(octants, lanes, &std::array::from_fn(|corner| feet[node(octant, corner)]));
+    out.clear();
+    out.resize(list.len(), Slot(0));
+    let mut kept = 0;
     for (&slot, row) in list.iter().zip(&octants.rows) {
-        (left[kept.0], right[kept.1]) = (slot, slot);
-        let (low, high) = stays::<F>(&F::pick(row, &lanes), &reach);
-        kept = (kept.0 + low, kept.1 + high);
+        out[kept] = slot;
+        kept += stays::<F>(row, lanes, &reach);
     }
-    left.truncate(kept.0);
-    right.truncate(kept.1);
+    out.truncate(kept);
 }
 
 #[cfg(test)]
@@ -340,26 +321,31 @@ mod tests {
     }
 
     #[test]
-    fn every_corner_of_an_octant_is_picked_from_its_lane() {
-        let row: [[f32; LANES]; PARTS] = std::array::from_fn(|part| std::array::from_fn(|lane| (part * LANES + lane) as f32));
-        for (octant, lanes) in PICK.iter().enumerate() {
-            let lanes: [u32; LANES] = std::array::from_fn(|lane| u32::from(lanes[lane % CORNERS]));
-            let picked = Plain::pick(&row, &lanes);
-            for lane in 0..LANES {
-                let n = usize::from(NODE[picked[lane] as usize]);
-                assert_eq!(n, node(octant, lane % CORNERS));
-            }
-            assert_eq!(native(&row, &lanes), picked);
+    fn a_triangle_stays_where_no_witness_is_nearer_to_all_corners() {
+        let mut random = Random::new(9);
+        let mut ruled = 0;
+        for round in 0..4000 {
+            let mut number = || if random.below(9) == 0 { 0.5 } else { random.unit() as f32 };
+            let row: [[f32; LANES]; PARTS] = std::array::from_fn(|_| std::array::from_fn(|_| number()));
+            let reach: Reach = std::array::from_fn(|_| std::array::from_fn(|_| 0.6 * number()));
+            let octant = round % OCTANTS;
+            let kept = stays::<Plain>(&row, PICK[octant], &reach);
+            let lane_of = |corner: usize| (0..NODES).find(|&lane| usize::from(NODE[lane]) == node(octant, corner)).expect("a lane");
+            let nearer = |witness: usize| (0..CORNERS).all(|corner| row.as_flattened()[lane_of(corner)] > reach[corner][witness]);
+            assert_eq!(kept == 0, (0..CORNERS).any(nearer), "octant {octant}: {row:?} and {reach:?}");
+            assert_eq!(native(&row, octant, &reach), kept, "octant {octant}: {row:?} and {reach:?}");
+            ruled += 1 - kept;
         }
+        assert!((100..3900).contains(&ruled), "{ruled} are ruled out");
     }
 
     multiversion!(
         /// What this machine runs.
-        fn native(row: &[[f32; LANES]; PARTS], lanes: &[u32; LANES]) -> [f32; LANES] = native_body
+        fn native(row: &[[f32; LANES]; PARTS], octant: usize, reach: &Reach) -> usize = native_body
     );
 
     #[inline(always)]
-    fn native_body<F: Fuse>(row: &[[f32; LANES]; PARTS], lanes: &[u32; LANES]) -> [f32; LANES] {
-        F::pick(row, lanes)
+    fn native_body<F: Fuse>(row: &[[f32; LANES]; PARTS], octant: usize, reach: &Reach) -> usize {
+        stays::<F>(row, PICK[octant], reach)
     }
 }
