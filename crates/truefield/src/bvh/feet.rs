@@ -17,23 +17,31 @@ pub(crate) struct Found {
 /// Pairs, and what is the nearest so far; memory that is used again.
 #[derive(Debug, Default)]
 pub(super) struct Feet {
+    chosen: Vec<(Slot, u32)>,
     pairs: Vec<(Slot, u32)>,
     groups: Vec<Packet>,
     found: Vec<Found>,
 }
 
 impl Feet {
-    /// Forgets all pairs.
-    pub fn clear(&mut self) {
-        self.pairs.clear();
+    /// Room for so many triangles, each with a bit for the points that it is chosen for.
+    #[inline(always)]
+    pub fn room(&mut self, count: usize) -> &mut [(Slot, u32)] {
+        if self.chosen.len() < count {
+            self.chosen.resize(count, (Slot(0), 0));
+        }
+        &mut self.chosen[..count]
     }
 
-    /// Chooses a triangle for the points that have a bit.
+    /// Chooses the first so many that were put there.
     #[inline(always)]
-    pub fn choose(&mut self, slot: Slot, mut points: u32) {
-        while points != 0 {
-            self.pairs.push((slot, points.trailing_zeros()));
-            points &= points - 1;
+    pub fn choose(&mut self, count: usize) {
+        self.pairs.clear();
+        for &(slot, mut points) in &self.chosen[..count] {
+            while points != 0 {
+                self.pairs.push((slot, points.trailing_zeros()));
+                points &= points - 1;
+            }
         }
     }
 
@@ -47,7 +55,7 @@ impl Feet {
     pub fn find(&mut self, tree: &Tree, points: &[DVec3; POINTS]) {
         self.found.clear();
         self.found.resize(POINTS, Found { nearest: Candidate::within(f64::INFINITY), foot: DVec3::ZERO });
-        let Self { pairs, groups, found } = self;
+        let Self { pairs, groups, found, .. } = self;
         let count = pairs.len().div_ceil(WIDTH);
         if groups.len() < count {
             groups.resize(count, Packet::EMPTY);

@@ -97,16 +97,23 @@ impl Octants {
     }
 
     fn place(&mut self, tree: &Tree, cell: &Aabb, nodes: &[DVec3; NODES]) {
-        self.points = std::array::from_fn(|lane| nodes[usize::from(NODE[lane.min(NODES - 1)])]);
-        self.base = cell.center();
-        self.error = filter_error(tree, cell) as f32;
-        self.offsets = std::array::from_fn(|part| Offsets::from_fn(|lane| self.points[part * LANES + lane] - self.base));
+        (self.base, self.error) = (cell.center(), filter_error(tree, cell) as f32);
+        for lane in 0..LANES * PARTS {
+            let p = nodes[usize::from(NODE[lane.min(NODES - 1)])];
+            let ([x, y, z], offsets, at) = ((p - self.base).to_array(), &mut self.offsets[lane / LANES], lane % LANES);
+            (offsets.x[at], offsets.y[at], offsets.z[at]) = (x as f32, y as f32, z as f32);
+            self.points[lane] = p;
+        }
     }
 
-    /// The nearest triangles and points of the nodes that are no corners of the cell, with the bits of brute force.
-    pub fn nearest(&mut self, tree: &Tree, list: &[Slot]) -> [Found; NODES] {
+    /// Finds the nearest triangles and points of the nodes that are no corners of the cell, with the bits of brute force.
+    pub fn nearest(&mut self, tree: &Tree, list: &[Slot]) {
         nearest(tree, self, list);
-        std::array::from_fn(|node| self.feet.found(usize::from(LANE[node])))
+    }
+
+    /// What is nearest to a node, of those that were looked for last.
+    pub fn found(&self, node: usize) -> Found {
+        self.feet.found(usize::from(LANE[node]))
     }
 
     /// Fills `out` with the complete lists of those octants that are `wanted`, a bit for each, from the nearest points of all
@@ -218,10 +225,13 @@ fn nearest_body<F: Fuse>(tree: &Tree, octants: &mut Octants, list: &[Slot]) {
     // The cell's own corners are known, and beyond the last node are none.
     least[0][..CORNERS].fill(-1.0);
     least[1][NODES - LANES..].fill(-1.0);
-    feet.clear();
+    let (chosen, mut count) = (feet.room(list.len()), 0);
     for (&slot, row) in list.iter().zip(rows.iter()) {
-        feet.choose(slot, F::mask_not_above(&row[0], &least[0]) | F::mask_not_above(&row[1], &least[1]) << LANES);
+        let points = F::mask_not_above(&row[0], &least[0]) | F::mask_not_above(&row[1], &least[1]) << LANES;
+        chosen[count] = (slot, points);
+        count += usize::from(points != 0);
     }
+    feet.choose(count);
     feet.find(tree, points);
 }
 
@@ -293,7 +303,8 @@ mod tests {
                 } else {
                     octants.measure(&tree, &cell, &nodes, &list);
                 }
-                let answers = octants.nearest(&tree, &list);
+                octants.nearest(&tree, &list);
+                let answers: [Found; NODES] = std::array::from_fn(|node| octants.found(node));
                 for n in (0..NODES).filter(|n| (0..CORNERS).all(|corner| node(corner, corner) != *n)) {
                     assert_eq!(answers[n].nearest, found[n], "node {n} of {cell:?}, {count} triangles of {size}");
                     assert_eq!(answers[n].foot, feet[n], "node {n} of {cell:?}, {count} triangles of {size}");

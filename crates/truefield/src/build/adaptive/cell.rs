@@ -5,7 +5,7 @@ use super::facets::At;
 use super::halves::steps;
 use crate::bvh::cover::Range;
 use crate::bvh::tree::Slot;
-use crate::geom::{Aabb, DVec3, Interval};
+use crate::geom::{Aabb, Interval};
 use crate::grid::Grid;
 use crate::source::mesh::Side;
 
@@ -69,9 +69,9 @@ pub(super) struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    pub fn at<'b>(&'b self, center: Option<DVec3>, list: &'b [Slot]) -> At<'b> {
+    pub fn at<'b>(&'b self, list: &'b [Slot]) -> At<'b> {
         let Start { range, side, .. } = self.start;
-        At { cell: self.cell, range, side, corners: self.corners, center, told: self.told, list }
+        At { cell: self.cell, range, side, corners: self.corners, told: self.told, list }
     }
 
     /// Whether no more is asked of it.
@@ -89,9 +89,9 @@ pub(super) struct Part {
 
 impl Part {
     /// What is told by the cell that it is a part of.
-    pub fn at<'b>(&'b self, center: Option<DVec3>, told: [f64; 8], list: &'b [Slot]) -> At<'b> {
+    pub fn at<'b>(&'b self, told: [f64; 8], list: &'b [Slot]) -> At<'b> {
         let Start { range, side, .. } = self.start;
-        At { cell: self.cell, range, side, corners: &self.corners, center, told, list }
+        At { cell: self.cell, range, side, corners: &self.corners, told, list }
     }
 }
 

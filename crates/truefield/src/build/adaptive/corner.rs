@@ -47,13 +47,14 @@ pub(super) fn found(surface: &Surface, p: DVec3, Found { nearest, foot }: Found,
     }
 }
 
-/// A point of the surface that may be nearest to `p`: the nearest of the triangles that are nearest to some other points.
+/// A point of the surface that may be nearest to `p`: that of the triangle whose nearest point to one of some other points is nearest.
 pub(super) fn nearest_of(surface: &Surface, p: DVec3, near: &[Corner; 8]) -> DVec3 {
-    let tree = surface.tree();
-    let feet = near.map(|corner| (corner.near, tree.facet_at(corner.near).foot(p)));
-    let (slot, foot) = feet.into_iter().min_by(|a, b| a.1.distance_squared.total_cmp(&b.1.distance_squared)).unwrap_or(feet[0]);
-    let facet = tree.facet_at(slot);
-    facet.a + facet.ab * foot.s + facet.ac * foot.t
+    let (mut slot, mut least) = (near[0].near, f64::INFINITY);
+    for corner in near {
+        let squared = (corner.foot - p).length_squared();
+        (slot, least) = if squared < least { (corner.near, squared) } else { (slot, least) };
+    }
+    surface.tree().facet_at(slot).nearest(p).point
 }
 
 /// The one side of a cell that the surface does not touch, where the side changes at the surface only.

@@ -17,12 +17,12 @@
 //!    least, of a triangle of the list, has n.(p - q) of at least |p - q| cos a in size; it is |p - q| at most.
 //! 5. There the gradient of the distance is such a mean brought to length 1: see `planes`.
 
-use super::corner::Corner;
+use super::corner::{Corner, nearest_of};
 use super::halves::{blend, of_part};
-use super::planes::{Plane, Slopes, between_planes};
+use super::planes::{Plane, Planes, Slopes, stretched};
 use super::triangles::{SHORT, above_triangles, below_triangles};
 use crate::bvh::cover::{OCTANTS, Range};
-use crate::bvh::octants::NODES;
+use crate::bvh::octants::{NODES, node};
 use crate::bvh::tree::Slot;
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::simd::{Fuse, multiversion};
@@ -42,8 +42,6 @@ pub(super) struct At<'a> {
     /// The side of all its points, where that is known.
     pub side: Option<Side>,
     pub corners: &'a [Corner; 8],
-    /// A point of the surface near its centre, where one is known.
-    pub center: Option<DVec3>,
     /// What is said at the corners, and between them by interpolation: by the cell itself or by one that it is a part of.
     pub told: [f64; 8],
     /// Every triangle that can be nearest in it.
@@ -54,11 +52,15 @@ pub(super) struct At<'a> {
 pub(super) struct Prover<'a> {
     surface: &'a Surface,
     planes: &'a [Plane],
+    taken: Planes,
+    /// The largest coordinate of the surface.
+    reach: f64,
 }
 
 impl<'a> Prover<'a> {
     pub fn new(surface: &'a Surface, planes: &'a [Plane]) -> Self {
-        Self { surface, planes }
+        let extent = surface.tree().extent;
+        Self { surface, planes, taken: Planes::default(), reach: extent.min.abs().max(extent.max.abs()).max_element() }
     }
 
     /// Unsigned distances in a cell, by its corners: by 1, or as far as one moves.
@@ -89,7 +91,7 @@ impl<'a> Prover<'a> {
         }
         if let Some(side) = at.side {
             let told = told.map(|v| side.sign() * v);
-            known = known.intersection(signed(side, by_corners(corners, &feet(at), &told, size.x, limit)));
+            known = known.intersection(signed(side, by_corners(&at.cell, corners, &told, limit)));
         }
         known.widen(self.slack(&at.cell))
     }
@@ -102,12 +104,14 @@ impl<'a> Prover<'a> {
             return known;
         }
         let told = at.told.map(|v| side.sign() * v);
-        let upper = above_in_parts(&at.cell, &feet(at), &blend(&told), limit);
+        let center = nearest_of(self.surface, at.cell.center(), at.corners);
+        let feet = std::array::from_fn(|k| if k < 8 { at.corners[k].foot } else { center });
+        let upper = above_in_parts(&at.cell, &feet, &blend(&told), limit);
         known.intersection(signed(side, Interval { lower: f64::NEG_INFINITY, upper }).widen(self.slack(&at.cell)))
     }
 
     /// Sharpens `known` by the planes of the list's triangles. Also returns which way the distance can change.
-    pub fn planes(&self, at: &At<'_>, known: Interval) -> (Interval, Option<Slopes>) {
+    pub fn planes(&mut self, at: &At<'_>, known: Interval) -> (Interval, Option<Slopes>) {
         if at.list.len() > PLANES || !at.corners.iter().all(|corner| corner.certain) {
             return (known, None);
         }
@@ -164,22 +168,21 @@ impl<'a> Prover<'a> {
 
     /// 4 and 5: contains the signed distance minus the interpolation, and which way it can change; `None` where the surface is
     /// not known to be sound.
-    fn by_planes(&self, at: &At<'_>) -> Option<(Interval, Slopes)> {
-        let turned = at.list.iter().try_fold(0.0f64, |turned, &slot| {
-            let asked = || self.surface.whole(self.surface.tree().triangle(slot), at.range.upper);
-            self.planes[slot.0 as usize].turned(asked).map(|angle| turned.max(angle))
-        })?;
-        let slopes = Slopes::of(self.planes, at.list, turned)?;
-        let found = between_planes(self.planes, at.list, at.corners, &at.told, slopes.stretch());
+    fn by_planes(&mut self, at: &At<'_>) -> Option<(Interval, Slopes)> {
+        let turned = self.taken.take(self.planes, at.list, at.range.upper)?;
+        let center = self.surface.tree().center;
+        // Heights first: what was stored in single numbers is better not read as vectors at once.
+        let heights = self.taken.heights(&Aabb::new(at.cell.min - center, at.cell.max - center));
+        let slopes = Slopes::of(&self.taken, turned)?;
+        let found = stretched(heights, &at.told, slopes.stretch());
         let differences = std::array::from_fn(|j| at.corners[j].value - at.told[j]);
         Some((found.intersection(slopes.between(&differences, at.cell.size().x)), slopes))
     }
 
     /// Rounding of lengths within the cell and the surface.
     pub fn slack(&self, cell: &Aabb) -> f64 {
-        let tree = self.surface.tree();
         // A normal of the flattest triangle that is relied on is off by 1e-9; a cell's list may reach across the surface.
-        let reach = tree.extent.min.abs().max(tree.extent.max.abs()).max(cell.min.abs()).max(cell.max.abs()).max_element();
+        let reach = cell.min.abs().max(cell.max.abs()).max_element().max(self.reach);
         128.0 * f64::EPSILON * reach + 1e-9 * cell.radius()
     }
 }
@@ -188,35 +191,46 @@ impl<'a> Prover<'a> {
 const ROUNDS: usize = 8;
 
 multiversion!(
-    /// 1, and 2 for points of the surface: contains the unsigned distance minus the interpolation of what is told in a cell of
-    /// edge `edge`; from above no sharper than `limit`.
-    fn by_corners(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], edge: f64, limit: f64) -> Interval = by_corners_body
+    /// 1, and 2 for points of the surface: contains the unsigned distance minus the interpolation of what is told; from above no
+    /// sharper than `limit`.
+    fn by_corners(cell: &Aabb, corners: &[Corner; 8], told: &[f64; 8], limit: f64) -> Interval = by_corners_body
 );
 
 #[inline(always)]
-fn by_corners_body<F: Fuse>(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], edge: f64, limit: f64) -> Interval {
-    let distances: [f64; 8] = std::array::from_fn(|j| corners[j].value.abs());
-    let difference = ends(&std::array::from_fn(|j| distances[j] - told[j])).0;
-    Interval { lower: difference - below(&distances, edge, limit + difference), upper: above_feet(corners, feet, told, limit) }
+fn by_corners_body<F: Fuse>(cell: &Aabb, corners: &[Corner; 8], told: &[f64; 8], limit: f64) -> Interval {
+    let (mut distances, mut differences, mut feet) = ([0.0; 8], [0.0; 8], [[0.0; 8]; 3]);
+    for (k, corner) in corners.iter().enumerate() {
+        distances[k] = corner.value.abs();
+        differences[k] = distances[k] - told[k];
+        (feet[0][k], feet[1][k], feet[2][k]) = (corner.foot.x, corner.foot.y, corner.foot.z);
+    }
+    let difference = ends(&differences).0;
+    let lower = difference - below(&distances, cell.max.x - cell.min.x, limit + difference);
+    Interval { lower, upper: above_feet(cell, &feet, told, limit) }
 }
 
 #[inline(always)]
-fn above_feet(corners: &[Corner; 8], feet: &[DVec3; 9], told: &[f64; 8], limit: f64) -> f64 {
-    let mut rows = [[0.0; 8]; 9];
-    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].point[axis]) };
-    let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-    for (row, foot) in rows.iter_mut().zip(feet) {
-        for lane in 0..8 {
-            let (x, y, z) = (xs[lane] - foot.x, ys[lane] - foot.y, zs[lane] - foot.z);
-            row[lane] = (x * x + y * y + z * z).sqrt() - told[lane];
+fn above_feet(cell: &Aabb, feet: &[[f64; 8]; 3], told: &[f64; 8], limit: f64) -> f64 {
+    let ends = |axis: usize| [square(cell.min[axis], &feet[axis]), square(cell.max[axis], &feet[axis])];
+    let (xs, ys, zs) = (ends(0), ends(1), ends(2));
+    let mut columns = [[0.0; 8]; 8];
+    for (j, column) in columns.iter_mut().enumerate() {
+        let (x, y, z) = (&xs[j & 1], &ys[j >> 1 & 1], &zs[j >> 2]);
+        for k in 0..8 {
+            column[k] = (x[k] + y[k] + z[k]).sqrt() - told[j];
         }
     }
-    mixed(&rows, limit)
+    mixed(std::array::from_fn(|j| &columns[j]), limit)
 }
 
-/// Points of the surface that are near a cell.
-fn feet(at: &At<'_>) -> [DVec3; 9] {
-    std::array::from_fn(|k| if k < 8 { at.corners[k].foot } else { at.center.unwrap_or(at.corners[0].foot) })
+/// Along an axis the squared distances from a place.
+#[inline(always)]
+fn square<const N: usize>(place: f64, others: &[f64; N]) -> [f64; N] {
+    let mut squares = [0.0; N];
+    for k in 0..N {
+        squares[k] = (place - others[k]) * (place - others[k]);
+    }
+    squares
 }
 
 multiversion!(
@@ -227,19 +241,22 @@ multiversion!(
 
 #[inline(always)]
 fn above_in_parts_body<F: Fuse>(cell: &Aabb, feet: &[DVec3; 9], told: &[f64; NODES], limit: f64) -> f64 {
-    let along = |axis: usize| [cell.min[axis], cell.center()[axis], cell.max[axis]];
-    let (xs, ys, zs) = (along(0), along(1), along(2));
-    let mut rows = [[0.0; NODES]; 9];
-    for (row, foot) in rows.iter_mut().zip(feet) {
-        let square = |from: f64| move |at: f64| (at - from) * (at - from);
-        let (x, y, z) = (xs.map(square(foot.x)), ys.map(square(foot.y)), zs.map(square(foot.z)));
-        for node in 0..NODES {
-            row[node] = (x[node % 3] + y[node / 3 % 3] + z[node / 9]).sqrt() - told[node];
+    let (mut along, center) = ([[0.0; 9]; 3], cell.center());
+    for (k, foot) in feet.iter().enumerate() {
+        (along[0][k], along[1][k], along[2][k]) = (foot.x, foot.y, foot.z);
+    }
+    let steps = |axis: usize| [cell.min[axis], center[axis], cell.max[axis]].map(|place| square(place, &along[axis]));
+    let (xs, ys, zs) = (steps(0), steps(1), steps(2));
+    let mut columns = [[0.0; 9]; NODES];
+    for (number, column) in columns.iter_mut().enumerate() {
+        let (x, y, z) = (&xs[number % 3], &ys[number / 3 % 3], &zs[number / 9]);
+        for k in 0..9 {
+            column[k] = (x[k] + y[k] + z[k]).sqrt() - told[number];
         }
     }
     let mut high = f64::NEG_INFINITY;
     for octant in 0..OCTANTS {
-        let found = mixed(&rows.map(|row| of_part(&row, octant)), limit);
+        let found = mixed(std::array::from_fn(|corner| &columns[node(octant, corner)]), limit);
         high = if found > high { found } else { high };
         if high > limit {
             break;
@@ -249,35 +266,34 @@ fn above_in_parts_body<F: Fuse>(cell: &Aabb, feet: &[DVec3; 9], told: &[f64; NOD
     if high > limit { f64::INFINITY } else { high }
 }
 
-/// The largest number of a mean of the rows, whose weights are chosen so that it is small; stops at `limit`.
+/// The largest number of a mean of some rows, of which a corner each has its column, whose weights are chosen so that it is
+/// small; stops at `limit`.
 ///
 /// Whatever the weights are, the mean bounds what each of the rows bounds. From the row whose largest number is the least on:
 /// where it is largest, another row is smallest; of both as much as makes the largest numbers equal.
 #[inline(always)]
-pub(super) fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
-    let (mut mean, mut high) = ([0.0; 8], f64::INFINITY);
-    for row in rows {
-        let highest = highest(row);
-        if highest < high {
-            (mean, high) = (*row, highest);
+pub(super) fn mixed<const N: usize>(columns: [&[f64; N]; 8], limit: f64) -> f64 {
+    let row = |number: usize| -> [f64; 8] { std::array::from_fn(|j| columns[j][number]) };
+    let mut tops = *columns[0];
+    for column in &columns[1..] {
+        for number in 0..N {
+            tops[number] = if column[number] > tops[number] { column[number] } else { tops[number] };
         }
     }
+    let (first, mut high) = lowest(&tops);
+    if high <= limit {
+        return high;
+    }
+    let mut mean = row(first);
     let mut at = place_of(&mean, high);
     for _ in 0..ROUNDS {
-        if high <= limit {
-            break;
-        }
-        let (mut other, mut low) = (0, f64::INFINITY);
-        for (number, row) in rows.iter().enumerate() {
-            let lower = row[at] < low;
-            (other, low) = if lower { (number, row[at]) } else { (other, low) };
-        }
+        let (other, low) = lowest(columns[at]);
         let fall = high - low;
         if !(fall > 0.0 && fall < f64::INFINITY) {
             break;
         }
-        let other = &rows[other];
-        let mut rival = place_of(other, highest(other));
+        let other = row(other);
+        let mut rival = place_of(&other, highest(&other));
         let mut better = None;
         for _ in 0..3 {
             let weight = ((high - mean[rival]) / (fall + other[rival] - mean[rival])).clamp(0.0, 1.0);
@@ -297,8 +313,25 @@ pub(super) fn mixed(rows: &[[f64; 8]], limit: f64) -> f64 {
         }
         let Some(found) = better else { break };
         (mean, at, high) = found;
+        if high <= limit {
+            break;
+        }
     }
     high
+}
+
+/// The first place of the least of some numbers, and that number.
+#[inline(always)]
+fn lowest<const N: usize>(numbers: &[f64; N]) -> (usize, f64) {
+    let (mut least, mut count) = (*numbers, N);
+    while count > 1 {
+        let half = count.div_ceil(2);
+        for k in 0..count / 2 {
+            least[k] = if least[k + half] < least[k] { least[k + half] } else { least[k] };
+        }
+        count = half;
+    }
+    (place_of(numbers, least[0]), least[0])
 }
 
 /// The largest of eight numbers, halves at a time.
@@ -312,8 +345,8 @@ pub(super) fn highest(row: &[f64; 8]) -> f64 {
 
 /// The first place of a number in a row.
 #[inline(always)]
-pub(super) fn place_of(row: &[f64; 8], number: f64) -> usize {
-    (0..8).rev().fold(0, |at, j| if row[j] == number { j } else { at })
+pub(super) fn place_of<const N: usize>(row: &[f64; N], number: f64) -> usize {
+    (0..N).rev().fold(0, |at, j| if row[j] == number { j } else { at })
 }
 
 /// 1: at most so much less than their interpolation are unsigned distances in a cell of edge h; no sharper than `enough`.
@@ -367,12 +400,18 @@ pub(super) fn below(distances: &[f64; 8], edge: f64, enough: f64) -> f64 {
 /// The affine function nearest to numbers at corners: its mean, how far it rises along each axis, and how far it is off.
 #[inline(always)]
 pub(super) fn affine(numbers: &[f64; 8]) -> (f64, [f64; 3], f64) {
-    let mean = numbers.iter().sum::<f64>() / 8.0;
-    let side = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -0.5 } else { 0.5 };
-    let rises: [f64; 3] = std::array::from_fn(|axis| (0..8).map(|corner| numbers[corner] * side(corner, axis)).sum::<f64>() / 2.0);
-    let affine = |corner: usize| mean + (0..3).map(|axis| rises[axis] * side(corner, axis)).sum::<f64>();
-    let rest = (0..8).map(|corner| (numbers[corner] - affine(corner)).abs()).fold(0.0, f64::max);
-    (mean, rises, rest)
+    // Sums and differences of the ends of all edges along x, of what these make along y, and of that along z.
+    let [sums, rises]: [[f64; 4]; 2] =
+        [std::array::from_fn(|k| numbers[2 * k] + numbers[2 * k + 1]), std::array::from_fn(|k| numbers[2 * k + 1] - numbers[2 * k])];
+    let ([low, high], across) = ([sums[0] + sums[1], sums[2] + sums[3]], (sums[1] - sums[0]) + (sums[3] - sums[2]));
+    let mean = (low + high) / 8.0;
+    let rises = [((rises[0] + rises[1]) + (rises[2] + rises[3])) / 4.0, across / 4.0, (high - low) / 4.0];
+    let mut off = [0.0; 8];
+    for corner in 0..8 {
+        let side = |axis: usize| if corner >> axis & 1 == 0 { -0.5 } else { 0.5 };
+        off[corner] = (numbers[corner] - (mean + (rises[0] * side(0) + rises[1] * side(1) + rises[2] * side(2)))).abs();
+    }
+    (mean, rises, highest(&off))
 }
 
 #[inline(always)]
@@ -400,11 +439,17 @@ pub(super) mod tests {
         (0..8).map(|j| numbers[j] * weight(j, 0) * weight(j, 1) * weight(j, 2)).sum()
     }
 
+    /// What a mean of rows bounds.
+    pub fn mean_of(rows: &[[f64; 8]]) -> f64 {
+        let columns: [[f64; 16]; 8] = std::array::from_fn(|j| std::array::from_fn(|k| rows.get(k).map_or(f64::INFINITY, |row| row[j])));
+        mixed(columns.each_ref(), f64::NEG_INFINITY)
+    }
+
     #[test]
     fn two_slopes_that_meet_cost_as_much_as_their_kink() {
         for (p, q) in [(1.0, 1.0), (0.25, 3.0), (1e-6, 1.0)] {
             let rows = [[0.0, q, 0.0, q, 0.0, q, 0.0, q], [p, 0.0, p, 0.0, p, 0.0, p, 0.0]];
-            let bound = mixed(&rows, f64::NEG_INFINITY);
+            let bound = mean_of(&rows);
             assert!((bound - p * q / (p + q)).abs() <= 1e-12 * p, "{p} {q}: {bound}");
         }
     }
@@ -417,7 +462,7 @@ pub(super) mod tests {
             let count = 1 + random.below(9);
             let rows: Vec<[f64; 8]> =
                 (0..count).map(|_| std::array::from_fn(|_| if random.unit() < zeros { 0.0 } else { random.between(-0.2, 1.0) })).collect();
-            let bound = mixed(&rows, f64::NEG_INFINITY);
+            let bound = mean_of(&rows);
             let plain = rows.iter().map(|row| ends(row).1).fold(f64::INFINITY, f64::min);
             assert!(bound <= plain, "{case}: {bound} and {plain}");
             for _ in 0..50 {
@@ -443,8 +488,8 @@ pub(super) mod tests {
                 Corner { value: nearest(point), certain: true, point, foot, near: Slot(0) }
             });
             let told = corners.map(|corner| corner.value + random.between(-0.01, 0.01));
-            let feet = std::array::from_fn(|k| corners[k % 8].foot);
-            let bound = above_feet(&corners, &feet, &told, f64::NEG_INFINITY);
+            let feet = [0, 1, 2].map(|axis| corners.map(|corner| corner.foot[axis]));
+            let bound = above_feet(&cell, &feet, &told, f64::NEG_INFINITY);
             let distances = corners.map(|corner| corner.value);
             let (sharp, plain) = (below(&distances, size, f64::NEG_INFINITY), below(&distances, size, f64::INFINITY));
             assert!(sharp <= plain, "{case}: {sharp} and {plain}");

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::cell::{Part, Seen, Start, place, within};
-use super::corner::{Corner, corner, found, list_side, nearest_of, one_side, side_by, side_of_ball};
+use super::corner::{Corner, corner, found, list_side, one_side, side_by, side_of_ball};
 use super::facets::Prover;
 use super::halves::{CENTER, Halves, INNER, blend, of_part};
 use super::planes::Plane;
@@ -92,18 +92,18 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let scale = surface.scale();
     let lattice =
         Grid { origin: root.extent.min * scale, spacing: edge * scale * (-f64::from(depth)).exp2(), first: [0; 3], shape: [1 << depth; 3] };
-    let planes = if leaves == Leaves::Exact { Vec::new() } else { Plane::all(surface) };
-    let job = Job { surface, planes: &planes, lattice: &lattice, depth, tiles, leaves, rules, cells: AtomicU64::new(0) };
+    let planes = if leaves == Leaves::Exact { Vec::new() } else { Plane::all(surface, run)? };
+    let outer = Outer::new(surface, &lattice, tiles, run)?;
+    let job = Job { surface, planes: &planes, lattice: &lattice, outer: &outer, depth, tiles, leaves, rules, cells: AtomicU64::new(0) };
     let parts = run.blocks("build the tree", 1 << (3 * tiles), |number| {
         let mut builder = Builder::new(&job);
-        builder.tile(from_curve(number), 1 << (depth - tiles), run)?;
+        builder.tile(from_curve(number), run)?;
         derive_errors(&mut builder.levels, Division::Octree);
         Ok(builder.levels)
     })?;
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
     let coverage = Coverage::of(&root, Some(surface.mesh().extent()));
-    let mut builder = Builder::new(&job);
-    let mut levels: Vec<Level> = (0..tiles).map(|above| builder.inner(above)).collect();
+    let mut levels: Vec<Level> = (0..tiles).map(|above| outer.level(above, scale)).collect();
     // Along the curve the cells of one tile follow those of the one before, at every depth.
     levels.push(Level::default());
     for part in parts {
@@ -123,6 +123,7 @@ struct Job<'a> {
     surface: &'a Surface,
     planes: &'a [Plane],
     lattice: &'a Grid,
+    outer: &'a Outer,
     /// Depth of single lattice cells.
     depth: u32,
     /// Depth of the tiles.
@@ -178,9 +179,9 @@ impl<'a> Builder<'a> {
     }
 
     /// Builds a tile, of which there are so many before it along each axis.
-    fn tile(&mut self, index: [i64; 3], edge: i64, run: &Run<'_>) -> Result<()> {
-        let low = index.map(|index| index * edge);
-        let corners = std::array::from_fn(|octant| self.corner(place(low, edge, octant), &[], None));
+    fn tile(&mut self, index: [i64; 3], run: &Run<'_>) -> Result<()> {
+        let edge = 1 << (self.job.depth - self.job.tiles);
+        let (low, corners) = (index.map(|index| index * edge), self.job.outer.corners(index, 1));
         let start = Start { low, edge, side: None, range: Range::ALL };
         let cell = start.cell(self.job.lattice);
         let tile = Part { start: self.look(start, &cell, &corners), cell, corners };
@@ -228,7 +229,7 @@ impl<'a> Builder<'a> {
         let told = values.map(|v| f64::from(v) * scale);
         let limit = self.allowed(&start);
         let mut seen = Seen { start, cell: *cell, corners, values, told, limit, known: Interval::ALL };
-        seen.known = self.prover.coarse(&seen.at(None, &[]), limit);
+        seen.known = self.prover.coarse(&seen.at(&[]), limit);
         seen
     }
 
@@ -258,7 +259,7 @@ impl<'a> Builder<'a> {
             list = &own;
         }
         if !proven && !list.is_empty() && self.job.leaves != Leaves::Exact {
-            seen.known = self.prover.planes(&seen.at(None, list), seen.known).0;
+            seen.known = self.prover.planes(&seen.at(list), seen.known).0;
         }
         let done = self.push_leaf(&seen, self.kind(&seen), list, run);
         self.owned.push(own);
@@ -281,7 +282,7 @@ impl<'a> Builder<'a> {
             self.narrow(&mut seen, squared.sqrt());
             if self.job.leaves == Leaves::Mixed {
                 seen.limit = self.allowed(&seen.start);
-                seen.known = self.prover.planes(&seen.at(None, list), seen.known).0;
+                seen.known = self.prover.planes(&seen.at(list), seen.known).0;
             }
             return self.push_leaf(&seen, self.kind(&seen), list, run);
         }
@@ -309,7 +310,7 @@ impl<'a> Builder<'a> {
         let (leaf, lists) = match self.job.leaves {
             Leaves::Exact => ((few || seen.start.range.lower >= FAR * seen.cell.radius()).then_some(LevelKind::Exact), None),
             Leaves::Mixed if few => {
-                seen.known = self.prover.planes(&seen.at(Some(halves.corner(CENTER).foot), list), seen.known).0;
+                seen.known = self.prover.planes(&seen.at(list), seen.known).0;
                 (Some(self.kind(&seen)), None)
             }
             Leaves::Linear | Leaves::Mixed => {
@@ -345,7 +346,7 @@ impl<'a> Builder<'a> {
         let samples = self.job.rules.rule == Rule::Samples;
         if !list.is_empty() {
             // The cheapest look at the list says enough where the surface is smooth.
-            let at = seen.at(Some(halves.corner(CENTER).foot), list);
+            let at = seen.at(list);
             let (mut known, slopes) = self.prover.planes(&at, seen.known);
             let certain = (0..NODES).all(|number| halves.corner(number).certain);
             if let Some(slopes) = slopes.filter(|_| certain && !within(known, seen.limit)) {
@@ -359,15 +360,13 @@ impl<'a> Builder<'a> {
         }
         parts.extend((0..OCTANTS).map(|octant| self.part(&seen.start, halves, octant)));
         let limit = seen.limit;
-        let surface = self.job.surface;
         let coarse = |prover: &Prover<'_>, octant: usize| {
             let (part, told) = (&parts[octant], of_part(&blended, octant));
-            let known = prover.coarse(&part.at(None, told, &[]), limit);
+            let known = prover.coarse(&part.at(told, &[]), limit);
             if samples || within(known, limit) {
                 return known;
             }
-            let foot = nearest_of(surface, part.cell.center(), &part.corners);
-            prover.parts(&part.at(Some(foot), told, &[]), known, limit)
+            prover.parts(&part.at(told, &[]), known, limit)
         };
         // Parts are looked at one by one. The first that fails decides, unless its list or the cell's says more.
         let mut by_corners = [Interval::ALL; OCTANTS];
@@ -383,14 +382,14 @@ impl<'a> Builder<'a> {
             seen.known = seen.known.intersection(by_corners.into_iter().fold(NOTHING, Interval::hull));
         }
         if !samples && !list.is_empty() && !seen.is_within() {
-            seen.known = self.prover.triangles(&seen.at(None, list), seen.known, limit);
+            seen.known = self.prover.triangles(&seen.at(list), seen.known, limit);
         }
         if seen.is_within() || list.is_empty() {
             return (samples || seen.is_within(), None);
         }
         let mut lists = None;
-        let by_list = |prover: &Prover<'_>, octant: usize, known: Interval, lists: &Parts| {
-            let at = parts[octant].at(None, of_part(&blended, octant), &lists.lists[octant]);
+        let by_list = |prover: &mut Prover<'_>, octant: usize, known: Interval, lists: &Parts| {
+            let at = parts[octant].at(of_part(&blended, octant), &lists.lists[octant]);
             let known = prover.planes(&at, known).0;
             if samples || within(known, limit) {
                 return known;
@@ -400,7 +399,7 @@ impl<'a> Builder<'a> {
         };
         if let Some(failing) = failing {
             let few = self.split(1 << failing, halves, list, None);
-            by_corners[failing] = by_list(&self.prover, failing, by_corners[failing], &few);
+            by_corners[failing] = by_list(&mut self.prover, failing, by_corners[failing], &few);
             lists = Some(few);
             if self.fails(by_corners[failing], limit) {
                 return (false, lists);
@@ -414,7 +413,7 @@ impl<'a> Builder<'a> {
         let mut whole = NOTHING;
         for octant in 0..OCTANTS {
             let known = by_corners[octant];
-            let known = if wanted >> octant & 1 == 1 { by_list(&self.prover, octant, known, &lists) } else { known };
+            let known = if wanted >> octant & 1 == 1 { by_list(&mut self.prover, octant, known, &lists) } else { known };
             whole = whole.hull(known);
             if self.fails(known, limit) {
                 whole = Interval::ALL;
@@ -517,12 +516,12 @@ impl<'a> Builder<'a> {
     /// Fills in the corners of the parts of the cell that was taken up, from its complete list.
     fn answer(&mut self, start: &Start, halves: &mut Halves, list: &[Slot]) {
         let Job { surface, lattice, .. } = *self.job;
-        let answers = self.octants.nearest(surface.tree(), list);
+        self.octants.nearest(surface.tree(), list);
         let parted = surface.side_changes_at_surface_only();
         let near: [Corner; 8] = std::array::from_fn(|corner| *halves.corner(node(corner, corner)));
         for number in INNER {
             let place = start.node(number);
-            let (p, answer) = (lattice.corner(place[0], place[1], place[2]), answers[number]);
+            let (p, answer) = (lattice.corner(place[0], place[1], place[2]), self.octants.found(number));
             let found = || {
                 let distance = answer.nearest.distance_squared.sqrt();
                 let side = start.side.or_else(|| if parted { side_by(surface, p, distance, &near) } else { None });
@@ -548,16 +547,45 @@ impl<'a> Builder<'a> {
         let found = || corner(job.surface, job.lattice.corner(place[0], place[1], place[2]), near, side);
         *self.corners.entry(key(place)).or_insert_with(found)
     }
+}
+
+/// The corners of all tiles.
+struct Outer {
+    /// x fastest.
+    corners: Vec<Corner>,
+    /// Tiles along each axis.
+    edge: i64,
+}
+
+impl Outer {
+    fn new(surface: &Surface, lattice: &Grid, tiles: u32, run: &Run<'_>) -> Result<Self> {
+        let (edge, step) = (1 << tiles, i64::from(lattice.shape[0] >> tiles));
+        let rows = run.blocks("look at the corners", ((edge + 1) * (edge + 1)) as usize, |row| {
+            let (y, z) = (row as i64 % (edge + 1), row as i64 / (edge + 1));
+            let mut corners: Vec<Corner> = Vec::new();
+            for x in 0..=edge {
+                let near = corners.last().copied();
+                corners.push(corner(surface, lattice.corner(x * step, y * step, z * step), near.as_slice(), None));
+            }
+            Ok(corners)
+        })?;
+        Ok(Self { corners: rows.concat(), edge })
+    }
+
+    /// Those of a cell of so many tiles along each axis, before which there are so many tiles.
+    fn corners(&self, low: [i64; 3], edge: i64) -> [Corner; 8] {
+        std::array::from_fn(|octant| {
+            let [x, y, z] = place(low, edge, octant);
+            self.corners[((z * (self.edge + 1) + y) * (self.edge + 1) + x) as usize]
+        })
+    }
 
     /// A level above the tiles.
-    fn inner(&mut self, depth: u32) -> Level {
-        let Job { surface, .. } = *self.job;
-        let edge = 1i64 << (self.job.depth - depth);
-        let mut level = Level::default();
+    fn level(&self, depth: u32, scale: f64) -> Level {
+        let (mut level, edge) = (Level::default(), self.edge >> depth);
         for number in 0..1 << (3 * depth) {
-            let low = from_curve(number).map(|index| index * edge);
-            let values = std::array::from_fn(|octant| (self.corner(place(low, edge, octant), &[], None).value / surface.scale()) as f32);
-            level.push(LevelKind::Branch, Record::new(values, Interval::ALL));
+            let corners = self.corners(from_curve(number).map(|index| index * edge), edge);
+            level.push(LevelKind::Branch, Record::new(corners.map(|corner| (corner.value / scale) as f32), Interval::ALL));
         }
         level
     }

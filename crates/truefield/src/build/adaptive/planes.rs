@@ -8,10 +8,11 @@
 //! distance is at most h / 2 times the sum of the s off. Instead of s along p and q: across m, d is within sin a of 0, and both
 //! make up 2^(1/2) sin a.
 
-use super::corner::Corner;
-use super::facets::{affine, ends};
+use super::facets::{affine, ends, place_of};
 use crate::bvh::tree::Slot;
-use crate::geom::{DVec3, Interval};
+use crate::error::Result;
+use crate::geom::{Aabb, DVec3, Interval};
+use crate::run::Run;
 use crate::simd::{Fuse, multiversion};
 use crate::source::mesh::Surface;
 
@@ -24,38 +25,104 @@ const FLAT: f64 = 1e-6;
 /// How far normals may be off that are relied on.
 const ROUNDED: f64 = 1e-9;
 
+/// Triangles that a worker takes at once.
+const CHUNK: usize = 4096;
+
+/// Normals that are looked at side by side.
+const LANES: usize = 8;
+
 /// The plane of a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
     normal: DVec3,
-    point: DVec3,
-    /// One over the triangle's least height; infinite where there is no normal to rely on.
-    flat: f64,
-    /// What keeps its edges from meeting its neighbours', where the surface is whole around it whatever is near.
-    apart: Option<f64>,
+    /// Of the plane over the tree's centre, along the normal.
+    height: f64,
+    /// How far the normal is off where edges meet their neighbours' but for rounding.
+    turned: f64,
+    /// The surface is whole around the triangle up to so far from it: nowhere where the normal is not to be relied on.
+    reach: f64,
 }
 
 impl Plane {
+    /// None that is to be relied on.
+    const NONE: Self = Self { normal: DVec3::ZERO, height: 0.0, turned: 0.0, reach: 0.0 };
+
     /// Those of all triangles, by slot.
-    pub fn all(surface: &Surface) -> Vec<Self> {
-        let tree = surface.tree();
-        let plane = |slot: u32| {
-            let facet = tree.facet_at(Slot(slot));
-            let cross = facet.ab.cross(facet.ac);
-            let longest = facet.ab.length_squared().max(facet.ac.length_squared()).max((facet.ac - facet.ab).length_squared()).sqrt();
-            let height = cross.length() / longest;
-            let flat = if height > FLAT * longest { 1.0 / height } else { f64::INFINITY };
-            Self { normal: cross / cross.length(), point: facet.a, flat, apart: surface.whole(tree.triangle(Slot(slot)), f64::MAX) }
-        };
-        (0..tree.len() as u32).map(plane).collect()
+    pub fn all(surface: &Surface, run: &Run<'_>) -> Result<Vec<Self>> {
+        let mut planes = vec![Self::NONE; surface.tree().len()];
+        run.chunks("look at the triangles", &mut planes, CHUNK, |chunk, planes| {
+            for (at, plane) in planes.iter_mut().enumerate() {
+                *plane = Self::new(surface, Slot((chunk * CHUNK + at) as u32));
+            }
+            Ok(())
+        })?;
+        Ok(planes)
     }
 
-    /// How far its normal is off where its edges meet its neighbours' but for rounding, `asked` where that was not found at
-    /// once; `None` where it is not to be relied on.
-    pub fn turned(&self, asked: impl FnOnce() -> Option<f64>) -> Option<f64> {
-        let angle = self.apart.or_else(asked)? * self.flat;
-        angle.is_finite().then_some(angle)
+    fn new(surface: &Surface, slot: Slot) -> Self {
+        let tree = surface.tree();
+        let facet = tree.facet_at(slot);
+        let cross = facet.ab.cross(facet.ac);
+        let longest = facet.ab.length_squared().max(facet.ac.length_squared()).max((facet.ac - facet.ab).length_squared()).sqrt();
+        let flattest = cross.length() / longest;
+        match surface.whole(tree.triangle(slot)) {
+            Some(whole) if flattest > FLAT * longest => {
+                let normal = cross / cross.length();
+                Self { normal, height: normal.dot(facet.a - tree.center), turned: whole.apart / flattest, reach: whole.reach }
+            }
+            _ => Self::NONE,
+        }
     }
+}
+
+/// The planes of a list, side by side.
+#[derive(Debug, Default)]
+pub(super) struct Planes {
+    /// Normals by their axes, and heights; the last plane fills the last group.
+    groups: Vec<[[f64; LANES]; 4]>,
+    sum: DVec3,
+}
+
+impl Planes {
+    /// Takes up a list, of which something can be nearest up to `reach` from a cell. How far normals may be off where edges
+    /// meet but for rounding; `None` where the surface is not known to be whole.
+    pub fn take(&mut self, planes: &[Plane], list: &[Slot], reach: f64) -> Option<f64> {
+        self.groups.clear();
+        self.sum = DVec3::ZERO;
+        let mut turned = 0.0;
+        for group in list.chunks(LANES) {
+            let (mut lanes, mut least) = ([[0.0; LANES]; 4], f64::INFINITY);
+            for lane in 0..LANES {
+                let plane = &planes[group[lane.min(group.len() - 1)].0 as usize];
+                let DVec3 { x, y, z } = plane.normal;
+                (lanes[0][lane], lanes[1][lane], lanes[2][lane], lanes[3][lane]) = (x, y, z, plane.height);
+                self.sum += if lane < group.len() { plane.normal } else { DVec3::ZERO };
+                turned = if plane.turned > turned { plane.turned } else { turned };
+                least = if plane.reach < least { plane.reach } else { least };
+            }
+            if !(least > reach) {
+                return None;
+            }
+            self.groups.push(lanes);
+        }
+        (!list.is_empty()).then_some(turned)
+    }
+
+    /// The least and the largest height over a plane at each corner of a cell, relative to the tree's centre.
+    pub fn heights(&self, cell: &Aabb) -> ([f64; 8], [f64; 8]) {
+        heights(&self.groups, cell)
+    }
+}
+
+/// The hull, at the corners of a cell, of what lies between heights over planes and `stretch` times as much, minus what is told.
+/// The larger of two multiples of a height is convex, the lesser concave: what they are at corners bounds them.
+pub(super) fn stretched((mut low, mut high): ([f64; 8], [f64; 8]), told: &[f64; 8], stretch: f64) -> Interval {
+    for lane in 0..8 {
+        let (least, most) = (low[lane], high[lane]);
+        low[lane] = if least > 0.0 { least } else { least * stretch } - told[lane];
+        high[lane] = if most > 0.0 { most * stretch } else { most } - told[lane];
+    }
+    Interval { lower: ends(&low).0, upper: ends(&high).1 }
 }
 
 /// Which way the distance to a sound piece of surface can change.
@@ -69,9 +136,10 @@ pub(super) struct Slopes {
 
 impl Slopes {
     /// By normals that are `turned` where edges meet but for rounding; `None` where they have no direction in common.
-    pub fn of(planes: &[Plane], list: &[Slot], turned: f64) -> Option<Self> {
+    pub fn of(planes: &Planes, turned: f64) -> Option<Self> {
         let off = 2.0 * turned + ROUNDED;
-        let (mean, farthest, cosine) = cone(planes, list);
+        let mean = planes.sum.normalize_or_zero();
+        let (farthest, cosine) = cone(&planes.groups, mean);
         let cosine = cosine - off;
         if !(cosine > STEEPEST) {
             return None;
@@ -81,7 +149,7 @@ impl Slopes {
         let mut shares = 0.5 * round * (DVec3::ONE - mean * mean);
         if let Some(p) = (farthest - mean * farthest.dot(mean)).try_normalize() {
             let q = mean.cross(p);
-            let [p_half, q_half] = halves(planes, list, [p, q]).map(|(low, high)| {
+            let [p_half, q_half] = halves(&planes.groups, [p, q]).map(|(low, high)| {
                 let stretched = |end: f64| if end > 0.0 { end / cosine } else { end };
                 0.5 * (stretched(high + off) + stretched(off - low))
             });
@@ -121,63 +189,70 @@ impl Slopes {
 }
 
 multiversion!(
-    /// The mean of the normals of a list, that which is farthest from it, and the cosine of both.
-    fn cone(planes: &[Plane], list: &[Slot]) -> (DVec3, DVec3, f64) = cone_body
+    /// The normal that is farthest from their mean, and the cosine of both.
+    fn cone(groups: &[[[f64; LANES]; 4]], mean: DVec3) -> (DVec3, f64) = cone_body
 );
 
 #[inline(always)]
-fn cone_body<F: Fuse>(planes: &[Plane], list: &[Slot]) -> (DVec3, DVec3, f64) {
-    let normals = || list.iter().map(|&slot| planes[slot.0 as usize].normal);
-    let mean = normals().sum::<DVec3>().normalize_or_zero();
-    let (mut farthest, mut cosine) = (mean, 1.0);
-    for normal in normals() {
-        let found = normal.dot(mean);
-        (farthest, cosine) = if found < cosine { (normal, found) } else { (farthest, cosine) };
+fn cone_body<F: Fuse>(groups: &[[[f64; LANES]; 4]], mean: DVec3) -> (DVec3, f64) {
+    let (mut least, mut farthest) = ([1.0; LANES], [[mean.x; LANES], [mean.y; LANES], [mean.z; LANES]]);
+    for [xs, ys, zs, _] in groups {
+        for lane in 0..LANES {
+            let cosine = xs[lane] * mean.x + ys[lane] * mean.y + zs[lane] * mean.z;
+            let farther = cosine < least[lane];
+            least[lane] = if farther { cosine } else { least[lane] };
+            farthest[0][lane] = if farther { xs[lane] } else { farthest[0][lane] };
+            farthest[1][lane] = if farther { ys[lane] } else { farthest[1][lane] };
+            farthest[2][lane] = if farther { zs[lane] } else { farthest[2][lane] };
+        }
     }
-    (mean, farthest, cosine)
+    let cosine = ends(&least).0;
+    let lane = place_of(&least, cosine);
+    (DVec3::new(farthest[0][lane], farthest[1][lane], farthest[2][lane]), cosine)
 }
 
 multiversion!(
     /// The least and the largest part of the normals along two axes.
-    fn halves(planes: &[Plane], list: &[Slot], axes: [DVec3; 2]) -> [(f64, f64); 2] = halves_body
+    fn halves(groups: &[[[f64; LANES]; 4]], axes: [DVec3; 2]) -> [(f64, f64); 2] = halves_body
 );
 
 #[inline(always)]
-fn halves_body<F: Fuse>(planes: &[Plane], list: &[Slot], axes: [DVec3; 2]) -> [(f64, f64); 2] {
-    let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
-    for &slot in list {
-        let normal = planes[slot.0 as usize].normal;
-        for (axis, ends) in axes.iter().zip(&mut ends) {
-            let along = normal.dot(*axis);
-            *ends = (if along < ends.0 { along } else { ends.0 }, if along > ends.1 { along } else { ends.1 });
+fn halves_body<F: Fuse>(groups: &[[[f64; LANES]; 4]], axes: [DVec3; 2]) -> [(f64, f64); 2] {
+    let (mut low, mut high) = ([[f64::INFINITY; LANES]; 2], [[f64::NEG_INFINITY; LANES]; 2]);
+    for [xs, ys, zs, _] in groups {
+        for (number, axis) in axes.iter().enumerate() {
+            for lane in 0..LANES {
+                let along = xs[lane] * axis.x + ys[lane] * axis.y + zs[lane] * axis.z;
+                low[number][lane] = if along < low[number][lane] { along } else { low[number][lane] };
+                high[number][lane] = if along > high[number][lane] { along } else { high[number][lane] };
+            }
         }
     }
-    ends
+    [(ends(&low[0]).0, ends(&high[0]).1), (ends(&low[1]).0, ends(&high[1]).1)]
 }
 
 multiversion!(
-    /// The hull, at the corners, of what lies between the heights above the planes and `stretch` times as much, minus what is
-    /// told. The larger of two multiples of a height is convex, the lesser concave: what they are at corners bounds them.
-    pub(super) fn between_planes(planes: &[Plane], list: &[Slot], corners: &[Corner; 8], told: &[f64; 8], stretch: f64) -> Interval = between_planes_body
+    /// At each corner of a cell the least and the largest height over a plane.
+    fn heights(groups: &[[[f64; LANES]; 4]], cell: &Aabb) -> ([f64; 8], [f64; 8]) = heights_body
 );
 
 #[inline(always)]
-fn between_planes_body<F: Fuse>(planes: &[Plane], list: &[Slot], corners: &[Corner; 8], told: &[f64; 8], stretch: f64) -> Interval {
-    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corners[j].point[axis]) };
+fn heights_body<F: Fuse>(groups: &[[[f64; LANES]; 4]], cell: &Aabb) -> ([f64; 8], [f64; 8]) {
+    let corner = |axis: usize, j: usize| if j >> axis & 1 == 0 { cell.min[axis] } else { cell.max[axis] };
+    let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| corner(axis, j)) };
     let (xs, ys, zs) = (axis(0), axis(1), axis(2));
     let (mut low, mut high) = ([f64::INFINITY; 8], [f64::NEG_INFINITY; 8]);
-    for &slot in list {
-        let Plane { normal, point, .. } = planes[slot.0 as usize];
-        for lane in 0..8 {
-            let height = normal.x * (xs[lane] - point.x) + normal.y * (ys[lane] - point.y) + normal.z * (zs[lane] - point.z);
-            let most = height * stretch;
-            let (less, more) = if height < most { (height, most) } else { (most, height) };
-            low[lane] = if less < low[lane] { less } else { low[lane] };
-            high[lane] = if more > high[lane] { more } else { high[lane] };
+    for group in groups {
+        for plane in 0..LANES {
+            let [x, y, z, height] = [group[0][plane], group[1][plane], group[2][plane], group[3][plane]];
+            for j in 0..8 {
+                let over = x * xs[j] + y * ys[j] + z * zs[j] - height;
+                low[j] = if over < low[j] { over } else { low[j] };
+                high[j] = if over > high[j] { over } else { high[j] };
+            }
         }
     }
-    let (low, high): ([f64; 8], [f64; 8]) = (std::array::from_fn(|j| low[j] - told[j]), std::array::from_fn(|j| high[j] - told[j]));
-    Interval { lower: ends(&low).0, upper: ends(&high).1 }
+    (low, high)
 }
 
 #[cfg(test)]
@@ -198,10 +273,12 @@ mod tests {
         for case in 0..2000 {
             let (mean, spread) = (random.direction(), [random.length(1e-3, 0.8), random.length(1e-3, 0.8)]);
             let planes: Vec<Plane> = (0..2 + random.below(8))
-                .map(|_| Plane { normal: near(&mut random, mean, spread), point: DVec3::ZERO, flat: 0.0, apart: Some(0.0) })
+                .map(|_| Plane { normal: near(&mut random, mean, spread), height: 0.0, turned: 0.0, reach: 1.0 })
                 .collect();
-            let list: Vec<Slot> = (0..planes.len() as u32).map(Slot).collect();
-            let Some(slopes) = Slopes::of(&planes, &list, 0.0) else { continue };
+            let (list, mut taken): (Vec<Slot>, _) = ((0..planes.len() as u32).map(Slot).collect(), Planes::default());
+            assert_eq!(taken.take(&planes, &list, 1.0), None, "{case}: the surface is not whole that far");
+            let turned = taken.take(&planes, &list, 0.5).expect("the surface is whole");
+            let Some(slopes) = Slopes::of(&taken, turned) else { continue };
             // Means of the normals, brought to length 1, as the gradients of planes near the middle.
             let edge = random.length(1e-2, 10.0);
             let heights: Vec<(DVec3, f64)> = (0..1 + random.below(4))

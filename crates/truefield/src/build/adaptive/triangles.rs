@@ -50,14 +50,15 @@ fn above_triangles_body<F: Fuse>(tree: &Tree, cell: &Aabb, list: &[Slot], told: 
     let places = corners_of(cell);
     let axis = |axis: usize| -> [f64; 8] { std::array::from_fn(|j| places[j][axis]) };
     let (xs, ys, zs) = (axis(0), axis(1), axis(2));
-    let mut rows = [[0.0; 8]; SHORT];
-    for (row, &slot) in rows.iter_mut().zip(list) {
-        let facet = tree.facet_at(slot);
+    let mut columns = [[f64::INFINITY; SHORT]; 8];
+    for (number, &slot) in list.iter().enumerate().take(SHORT) {
+        let (facet, mut row) = (tree.facet_at(slot), [0.0; 8]);
         for lane in 0..8 {
             row[lane] = facet.distance_squared(DVec3::new(xs[lane], ys[lane], zs[lane])).sqrt() - told[lane];
         }
+        (0..8).for_each(|lane| columns[lane][number] = row[lane]);
     }
-    mixed(&rows[..list.len().min(SHORT)], limit)
+    mixed(columns.each_ref(), limit)
 }
 
 #[inline(always)]
@@ -74,19 +75,23 @@ fn support(places: &[DVec3; 8], told: &[f64; 8], size: DVec3) -> (DVec3, f64) {
     (slope, ends(&std::array::from_fn(|j| slope.dot(places[j]) - told[j])).0)
 }
 
+/// Tangents of a triangle's distance that are tried.
+const TANGENTS: usize = 3;
+
 /// The largest number of a mean of a tangent's row and of those where it is largest; stops at `limit`.
 #[inline(always)]
 fn above_tangents(facet: &Facet, row: &[f64; 8], places: &[DVec3; 8], told: &[f64; 8], limit: f64) -> f64 {
-    let (mut rows, mut least, mut high) = ([*row; 3], *row, highest(row));
-    for count in 1..3 {
+    let (mut columns, mut least, mut high) = (row.map(|number| [number; TANGENTS]), *row, highest(row));
+    for count in 1..TANGENTS {
         if high <= limit {
             break;
         }
-        rows[count] = under_tangent(facet, places[place_of(&least, highest(&least))], places, told);
+        let found = under_tangent(facet, places[place_of(&least, highest(&least))], places, told);
         for lane in 0..8 {
-            least[lane] = if rows[count][lane] < least[lane] { rows[count][lane] } else { least[lane] };
+            columns[lane][count] = found[lane];
+            least[lane] = if found[lane] < least[lane] { found[lane] } else { least[lane] };
         }
-        high = mixed(&rows[..=count], limit);
+        high = mixed(columns.each_ref(), limit);
     }
     high
 }
@@ -108,7 +113,7 @@ fn under_tangent(facet: &Facet, p: DVec3, places: &[DVec3; 8], told: &[f64; 8]) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::adaptive::facets::tests::interpolate;
+    use crate::build::adaptive::facets::tests::{interpolate, mean_of};
     use crate::build::adaptive::facets::{above_in_parts, below};
     use crate::build::adaptive::halves::blend;
     use crate::bvh::Candidate;
@@ -164,6 +169,6 @@ mod tests {
     /// The bound by the same points without parts.
     fn spread(cell: &Aabb, feet: &[DVec3; 9], told: &[f64; 8]) -> f64 {
         let rows = feet.map(|foot| std::array::from_fn(|j| (cell.corner(j) - foot).length() - told[j]));
-        mixed(&rows, f64::NEG_INFINITY)
+        mean_of(&rows)
     }
 }

@@ -22,7 +22,7 @@ use crate::mesh::TriangleMesh;
 use crate::mesh::topology::Topology;
 use crate::run::Run;
 
-pub(crate) use sign::Signs;
+pub(crate) use sign::{Signs, Whole};
 
 /// A triangle mesh with everything needed to answer: exact distances, nearest points and sides.
 ///
@@ -98,8 +98,8 @@ impl Surface {
     }
 
     /// See `Signs::whole`, in the tree's units.
-    pub(crate) fn whole(&self, triangle: u32, reach: f64) -> Option<f64> {
-        self.signs.whole(triangle, reach)
+    pub(crate) fn whole(&self, triangle: u32) -> Option<Whole> {
+        self.signs.whole(triangle)
     }
 
     /// Whether two points joined by a path off the surface are always on the same side.

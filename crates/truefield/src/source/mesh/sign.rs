@@ -82,6 +82,15 @@ impl Side {
     }
 }
 
+/// A triangle around which the surface is whole.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Whole {
+    /// How far edges that meet may be apart.
+    pub apart: f64,
+    /// Nearer to the triangle than this the surface parts outside, on the side of its normal, from inside.
+    pub reach: f64,
+}
+
 /// Decides sides for one mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct Signs {
@@ -218,19 +227,15 @@ impl Signs {
         }
     }
 
-    /// How far edges that meet may be apart, where the surface is whole all around a triangle and parts outside, on the
-    /// side of its normal, from inside up to `reach` from it; `None` where that is not known.
-    pub fn whole(&self, triangle: u32, reach: f64) -> Option<f64> {
+    /// Up to where the surface is whole around a triangle, if it is at all.
+    pub fn whole(&self, triangle: u32) -> Option<Whole> {
         let decided = self.decided.as_ref()?;
-        let plain = match &decided.walls {
-            Walls::Trusted => false,
-            Walls::Clean => true,
-            Walls::Known(walls) => {
-                let wall = &walls[triangle as usize];
-                wall.is_plain() && f64::from(wall.reach) > reach
-            }
-        };
-        (plain && decided.normals.whole(triangle)).then(|| decided.normals.rounding())
+        if matches!(decided.walls, Walls::Trusted) {
+            return None;
+        }
+        let wall = decided.wall(triangle);
+        let plain = wall.is_plain() && decided.normals.whole(triangle);
+        plain.then(|| Whole { apart: decided.normals.rounding(), reach: f64::from(wall.reach) })
     }
 
     /// Whether `p` is certainly outside, wherever the surface is near it.
