@@ -512,3 +512,37 @@ fn building_does_not_depend_on_threads() {
     })
     .unwrap_or_else(|broken| panic!("{broken}"));
 }
+
+/// From its middle, all of a ball is as near: bounds meet only after hundreds of thousands of boxes. Values go there, or fail.
+#[test]
+fn values_are_exact_where_much_of_the_surface_is_as_near() {
+    let [x, y, z] = axes();
+    let square_of_way = square(&x) + square(&y) + square(&z);
+    let ball = shape(&(square_of_way.unary(Unary::SquareRoot) - 1.0), cube(1.5));
+    for way in [0.0, 1e-6, 1e-4] {
+        let p = DVec3::new(way, 0.5 * way, -way);
+        let (truth, at) = (p.length() - 1.0, ball.at(p));
+        assert!(at.contains(truth) && (way > 1e-5 || at.width() > 4.0 * ball.noise()), "{at:?} is not wide: it was not cut off");
+        let (value, slack) = (value(&ball, p), ball.slack(&Aabb::new(p, p).grow(1e-5)));
+        assert!(slack.contains(truth - value) && slack.width() <= 4.0 * ball.noise(), "{value} is not {truth}, {slack:?}");
+    }
+}
+
+/// Far from the origin, the terms of a ball cancel but for their rounding, which blurs the surface.
+#[test]
+fn what_rounding_blurs_is_counted() {
+    let [x, y, z] = axes();
+    for far in [1e3, 1e5, 1e6] {
+        let expanded = square(&x) + square(&y) + square(&z) - x.clone() * (2.0 * far) - y.clone() * (4.0 * far) + (5.0 * far * far - 1.0);
+        let center = DVec3::new(far, 2.0 * far, 0.0);
+        let ball = shape(&expanded, Aabb::new(center - 1.5, center + 1.5));
+        let mut random = Random::new(5);
+        for _ in 0..500 {
+            let p = random.within(&ball.domain());
+            let truth = p.distance(center) - 1.0;
+            let (at, value, slack) = (ball.at(p), value(&ball, p), ball.slack(&Aabb::new(p, p).grow(1e-5)));
+            assert!(at.widen(1e-15 * far).contains(truth), "{truth} is not in {at:?}");
+            assert!(slack.widen(1e-15 * far).contains(truth - value), "{value} is not {truth} within {slack:?}");
+        }
+    }
+}

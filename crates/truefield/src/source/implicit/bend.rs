@@ -1,6 +1,7 @@
 //! How the distance of a formula's surface bends.
 
 use super::matrix::{eigenvalues, middle, middle_of, penalised};
+use super::search::Effort;
 use super::shape::Implicit;
 use super::sheet::{Sheet, Side};
 use crate::distance::Distance;
@@ -29,7 +30,7 @@ pub(super) fn bend(shape: &Implicit, cell: &Aabb) -> Interval {
     if side == Side::Inside && is_flat(shape, cell, center, radius) {
         return Interval::exact(0.0);
     }
-    let found = shape.search(center, side);
+    let found = shape.search(center, side, Effort::Short);
     let rough = around_point(found.lower - radius, side);
     let Some(foot) = found.foot else { return rough };
     let middle = Middle { side: Some(side), near: found.lower, far: found.upper, foot };

@@ -2,13 +2,16 @@
 
 use super::boxes::Boxes;
 use super::expression::Expression;
-use super::search::{Accuracy, Found, Search, both_sides};
+use super::search::{Accuracy, Effort, Found, Search, both_sides};
 use super::sheet::Side;
 use super::tape::Tape;
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
+
+/// Bounds of the distance meet to within so many times what rounding of the formula moves the surface by.
+const BLURRED: f64 = 4.0;
 
 /// The part of a domain where a formula is negative, with its true distance.
 ///
@@ -43,7 +46,9 @@ impl Implicit {
         let tape = Tape::new(expression)?;
         let boxes = Boxes::build(&tape, &domain, run)?.checked(&tape, &domain)?;
         let size = domain.diagonal() + f64::EPSILON.sqrt() * domain.min.abs().max(domain.max.abs()).max_element();
-        let accuracy = Accuracy { smooth: 1e-10 * size, hard: 1e-6 * size, rough: 1e-4 * size };
+        // No search locates the surface better than the formula is rounded: bounds stay apart by twice that, more or less.
+        let blur = boxes.taylors.iter().fold(0.0_f64, |blur, taylor| blur.max(taylor.blur));
+        let accuracy = Accuracy { smooth: 1e-10 * size, hard: (1e-6 * size).max(BLURRED * blur), rough: 1e-4 * size };
         let extent = boxes.solid;
         Ok(Self { tape, domain, boxes, accuracy, extent })
     }
@@ -63,16 +68,16 @@ impl Implicit {
     pub fn foot(&self, p: DVec3) -> Option<DVec3> {
         let inner = p.clamp(self.domain.min, self.domain.max);
         let side = self.side(inner)?;
-        let found = self.search(p, side);
+        let found = self.search(p, side, Effort::Short);
         found.foot.filter(|_| side == Side::Outside || p == inner)
     }
 
     /// The distance to the formula's surface within the domain, inside only where it is nearer than the faces; `side` is that
     /// of the nearest point of the domain.
-    pub(super) fn search(&self, p: DVec3, side: Side) -> Found {
+    pub(super) fn search(&self, p: DVec3, side: Side, effort: Effort) -> Found {
         // The faces of the domain are surface to what is inside.
         let limit = if side == Side::Inside { self.depth(p) } else { f64::INFINITY };
-        Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run()
+        Search::new(&self.tape, &self.domain, &self.boxes, self.accuracy, p, side, limit).run(effort)
     }
 
     /// The side of a point of the domain, where it is certain.
@@ -101,7 +106,7 @@ impl Implicit {
         if side == Side::Inside && p != inner {
             return (p - inner).normalize_or_zero();
         }
-        match self.search(p, side).foot {
+        match self.search(p, side, Effort::Short).foot {
             Some(foot) if (p - foot).length() > 1e-6 * self.domain.diagonal() => (p - foot).normalize_or_zero() * side.sign(),
             Some(foot) if foot.cmpgt(self.domain.min).all() && foot.cmplt(self.domain.max).all() => slope(),
             Some(foot) => (p - foot).normalize_or_zero() * side.sign(),
@@ -121,10 +126,11 @@ impl Implicit {
         }
     }
 
-    /// What is known of the distance, and the number that fields sample.
-    fn answer(&self, p: DVec3) -> (Interval, f64) {
+    /// What is known of the distance, and the number that fields sample, where that is as near as the noise to the distance or
+    /// to the next leaf that says itself how much farther the surface may be.
+    fn answer(&self, p: DVec3, effort: Effort) -> (Interval, Option<f64>) {
         if !p.is_finite() {
-            return (Interval::ALL, f64::NAN);
+            return (Interval::ALL, Some(f64::NAN));
         }
         let inner = p.clamp(self.domain.min, self.domain.max);
         let apart = (p - inner).length();
@@ -133,15 +139,15 @@ impl Implicit {
             let far = both_sides(&self.tape, &self.domain, inner, 0.0, None);
             // The side is not known, the value is as good as rounding allows.
             return if apart == 0.0 {
-                (Interval { lower: -far.min(self.depth(p).max(0.0) + rounding), upper: far }, 0.0)
+                (Interval { lower: -far.min(self.depth(p).max(0.0) + rounding), upper: far }, Some(0.0))
             } else {
-                (Interval { lower: apart - rounding, upper: apart + far + rounding }, apart)
+                (Interval { lower: apart - rounding, upper: apart + far + rounding }, Some(apart))
             };
         };
         if side == Side::Inside && apart > 0.0 {
-            return (Interval::around(apart, rounding), apart);
+            return (Interval::around(apart, rounding), Some(apart));
         }
-        let Found { mut lower, mut upper, .. } = self.search(p, side);
+        let Found { mut lower, mut upper, left, .. } = self.search(p, side, effort);
         if side == Side::Inside {
             let depth = self.depth(p);
             (lower, upper) = (lower.min(depth - rounding).max(0.0), upper.min(depth + rounding));
@@ -149,13 +155,26 @@ impl Implicit {
             lower = lower.max(apart - rounding);
         }
         // Where the surface cannot be located, the value is the distance to where it may be.
-        let value = if upper - lower <= 2.0 * self.noise() { 0.5 * lower + 0.5 * upper } else { lower };
+        let value = match () {
+            () if upper - lower <= 2.0 * self.noise() => Some(0.5 * lower + 0.5 * upper),
+            () if left > lower => Some(lower),
+            () => None,
+        };
         let interval = Interval { lower, upper };
         match side {
-            Side::Inside => (Interval { lower: -interval.upper, upper: -interval.lower }, -value),
+            Side::Inside => (interval.negated(), value.map(|value| -value)),
             Side::Outside => (interval, value),
         }
     }
+}
+
+/// Where a search ends before bounds meet.
+fn open(p: DVec3, bounds: Interval) -> Error {
+    Error::invalid(format!(
+        "the distance at {p} is only known to be from {} to {}: much of the surface is about as far, or rounding blurs it; \
+         write the expression with fewer terms and smaller numbers, or take bounds there",
+        bounds.lower, bounds.upper
+    ))
 }
 
 impl Distance for Implicit {
@@ -164,14 +183,15 @@ impl Distance for Implicit {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        self.answer(p).0
+        self.answer(p, Effort::Short).0
     }
 }
 
 impl Source for Implicit {
     fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
         for (&p, out) in points.iter().zip(out) {
-            *out = self.answer(p).1;
+            let (bounds, value) = self.answer(p, Effort::Whole);
+            *out = value.ok_or_else(|| open(p, bounds))?;
             if out.is_nan() || self.tape.value(p.clamp(self.domain.min, self.domain.max)).is_nan() {
                 return Err(Error::invalid(format!(
                     "the expression is not a number at {p}; give a domain in which its roots, logarithms and quotients are defined"
@@ -189,16 +209,17 @@ impl Source for Implicit {
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {
-        let (at, value) = self.answer(cell.center());
+        let (at, value) = self.answer(cell.center(), Effort::Short);
         let radius = cell.radius() * (1.0 + 1e-15);
         let near = at.upper.max(-at.lower) + radius;
         // Where bounds meet, the value is their middle and less than the noise from the distance. Elsewhere it is how far a
-        // box is that may hold surface: `known` says how much farther the surface is than any point of such a box.
-        // A search that ends because it has made as many boxes as it may leaves more open, which is not counted here.
+        // box is that may hold surface: `known` says how much farther the surface is than any point of such a box. There are
+        // no other values: see `answer`.
         let error = self.boxes.known_near(cell, near) + 2.0 * self.noise();
         // Both change by no more than one moves.
         let moved = 2.0 * radius + self.noise();
-        Interval { lower: (at.lower - value - moved).max(-error), upper: (at.upper - value + moved).min(error) }
+        let [lower, upper] = value.map_or([-error, error], |value| [at.lower - value - moved, at.upper - value + moved]);
+        Interval { lower: lower.max(-error), upper: upper.min(error) }
     }
 
     fn bend(&self, cell: &Aabb) -> Interval {
@@ -214,6 +235,7 @@ impl Source for Implicit {
     }
 
     fn noise(&self) -> f64 {
-        if self.boxes.rough { self.accuracy.rough.max(self.boxes.widest) } else { self.accuracy.hard }
+        let Accuracy { hard, rough, .. } = self.accuracy;
+        if self.boxes.rough { rough.max(hard).max(self.boxes.widest) } else { hard }
     }
 }

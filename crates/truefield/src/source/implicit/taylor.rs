@@ -29,6 +29,8 @@ pub(super) struct Taylor {
     matrix: [f64; 6],
     remainder: f64,
     thickness: f64,
+    /// How far rounding of the formula in the middle may move the surface.
+    pub blur: f64,
     /// The middle of the tangent plane, and how far some surface of the box is from it at most: infinite where there may be none.
     onto: DVec3,
     reach: f64,
@@ -55,6 +57,7 @@ impl Taylor {
         let bent = |entry: &dyn Fn(usize) -> f64| {
             (0..6).map(|k| entry(k) * half[PAIRS[k].0] * half[PAIRS[k].1] * if k < 3 { 0.5 } else { 1.0 }).sum::<f64>()
         };
+        let blur = doubt / steepness;
         let doubt = doubt + spread * half.length();
         let rounding = 1e-14 * (value.abs() + half.element_sum() + bent(&|k| matrix[k].abs()));
         let remainder = (doubt + bent(&|k| parts[k].1)) / steepness * (1.0 + 1e-14) + rounding;
@@ -76,7 +79,7 @@ impl Taylor {
         let slab = thickness * (1.0 + 1e-14);
         let reach = if ((normal * value).abs() + normal.abs() * slab).cmplt(half * (1.0 - 1e-12)).all() { slab } else { f64::INFINITY };
         let onto = center - normal * value;
-        Self { center, half, value, normal, matrix, remainder, thickness, onto, reach, whole, tangential, along, across }
+        Self { center, half, value, normal, matrix, remainder, thickness, blur, onto, reach, whole, tangential, along, across }
     }
 
     /// That of a sheet in a box in which the formula rises.

@@ -2,6 +2,7 @@
 
 use super::bend::{Middle, is_flat, one_foot};
 use super::matrix::middle_of;
+use super::search::Effort;
 use super::shape::Implicit;
 use super::sheet::Side;
 use crate::geom::{Aabb, DVec3};
@@ -27,7 +28,7 @@ fn proven(shape: &Implicit, p: DVec3) -> Option<f64> {
     let middle = match side {
         None => Middle { side, near: 0.0, far: crate::distance::Distance::at(shape, p).upper, foot: p },
         Some(known) => {
-            let found = shape.search(p, known);
+            let found = shape.search(p, known, Effort::Short);
             match found.foot {
                 // The nearest face of the domain.
                 None => return is_flat(shape, &Aabb::new(p, p), p, 0.0).then_some(ROUNDING),

@@ -1,5 +1,6 @@
 //! The distance to the surface within the domain, from a point: best first over boxes, until both bounds meet.
 
+mod deep;
 mod lead;
 mod prove;
 mod side;
@@ -15,8 +16,11 @@ use crate::source::waiting::Waiting;
 
 pub(super) use side::both_sides;
 
-/// Boxes that one search makes at most, beside those of the tree.
+/// Boxes that one search makes at most, beside those of the tree, before it is cut off,
 const MOST: usize = 20_000;
+
+/// or goes into the depth.
+const SOON: usize = 2_000;
 
 /// Of those, boxes without a sheet.
 const OPEN: usize = 2_000;
@@ -32,6 +36,15 @@ const DONE: f64 = 1e-5;
 
 /// Boxes are farther than the surface for certain, where they are by this part.
 const CLEAR: f64 = 1.0 + 1e-9;
+
+/// What a search does about places that much of the surface is nearly as far from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// It is cut off: bounds hold, and may be far apart.
+    Short,
+    /// It goes on until both bounds nearly meet, at two hundred times the boxes.
+    Whole,
+}
 
 /// How exactly the surface is located.
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +66,8 @@ pub(super) struct Found {
     pub upper: f64,
     /// Where it seems nearest.
     pub foot: Option<DVec3>,
+    /// Of what is no nearer than `lower`, but for leaves that say themselves how much farther the surface may be.
+    pub left: f64,
 }
 
 /// Something that may hold the nearest point.
@@ -73,6 +88,8 @@ struct Piece {
     sheet: Option<(Taylor, Sheet, DVec3)>,
     /// Whether a foot is worth looking for: every other time that a box is cut.
     fresh: bool,
+    /// Whether its leaf says how far the surface is from any point of it.
+    known: bool,
 }
 
 /// One search under way.
@@ -89,8 +106,14 @@ pub(super) struct Search<'a> {
     pieces: Vec<Piece>,
     /// How many of them have no sheet.
     open: usize,
-    /// Squared: what was set aside is no nearer.
+    effort: Effort,
+    /// In the depth: what is next with its squared lower bound, and how many there were.
+    deep: Vec<(f64, Aabb)>,
+    made: usize,
+    /// Squared: what was set aside is no nearer,
     floor: f64,
+    /// nor is what was set aside though nothing says how much farther the surface is.
+    left: f64,
     upper: f64,
     /// Squared: some surface is nearer, whichever; what is not, is not looked at.
     beyond: f64,
@@ -112,8 +135,6 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     /// Surface that is not nearer than `limit` is not looked for.
     pub(super) fn new(tape: &'a Tape, domain: &'a Aabb, boxes: &'a Boxes, accuracy: Accuracy, p: DVec3, side: Side, limit: f64) -> Self {
-        let (heap, pieces, proven, feet) = (BinaryHeap::new(), Vec::new(), Vec::new(), Vec::new());
-        let (floor, upper) = (f64::INFINITY, limit);
         Self {
             tape,
             domain,
@@ -121,16 +142,20 @@ impl<'a> Search<'a> {
             accuracy,
             p,
             side,
-            heap,
-            pieces,
+            heap: BinaryHeap::new(),
+            pieces: Vec::new(),
             open: 0,
-            floor,
-            upper,
+            effort: Effort::Short,
+            deep: Vec::new(),
+            made: 0,
+            floor: f64::INFINITY,
+            left: f64::INFINITY,
+            upper: limit,
             beyond: f64::INFINITY,
             foot: None,
-            proven,
+            proven: Vec::new(),
             free: Vec::new(),
-            feet,
+            feet: Vec::new(),
             started: None,
             above: Vec::new(),
             first: None,
@@ -138,7 +163,8 @@ impl<'a> Search<'a> {
     }
 
     /// Searches the tree.
-    pub(super) fn run(mut self) -> Found {
+    pub(super) fn run(mut self, effort: Effort) -> Found {
+        self.effort = effort;
         if let Some(root) = self.boxes.root() {
             self.start(root);
             // What led to the first leaf says nothing of others.
@@ -156,10 +182,17 @@ impl<'a> Search<'a> {
                 }
                 continue;
             }
-            if bound >= self.floor || self.is_enough(bound) || self.pieces.len() > MOST || self.open > OPEN {
-                self.floor = self.floor.min(bound);
+            if self.is_done(bound, self.enough()) {
                 self.reach(item);
                 continue;
+            }
+            if self.is_full() {
+                let known = self.is_known(item);
+                if known || !self.goes_deep() {
+                    self.set_aside(bound, known);
+                    self.reach(item);
+                    continue;
+                }
             }
             match item {
                 Place::Node(_) => {}
@@ -170,6 +203,7 @@ impl<'a> Search<'a> {
                     self.settle(bound, &piece);
                 }
             }
+            self.go_deep();
         }
         // Next to a rim of the domain, the other side may lie off the slope of the formula.
         if let Some(first) = self.first.filter(|_| self.upper == f64::INFINITY) {
@@ -177,8 +211,41 @@ impl<'a> Search<'a> {
         }
         // Rounding of points and of what was subtracted from them.
         let rounding = 4.0 * f64::EPSILON * (self.p.abs().max_element() + self.domain.min.abs().max(self.domain.max.abs()).max_element());
-        let lower = (self.floor.max(0.0).sqrt() * (1.0 - 4.0 * f64::EPSILON) - rounding).max(0.0);
-        Found { lower: lower.min(self.upper), upper: self.upper + rounding, foot: self.foot }
+        let [lower, left] = [self.floor, self.left].map(|square| {
+            let least = square.max(0.0).sqrt() * (1.0 - 4.0 * f64::EPSILON) - rounding;
+            least.max(0.0).min(self.upper)
+        });
+        Found { lower, upper: self.upper + rounding, foot: self.foot, left }
+    }
+
+    /// Whether nothing is gained by looking at what is no nearer than that; then it is set aside.
+    fn is_done(&mut self, bound: f64, enough: f64) -> bool {
+        let done = bound >= self.floor || self.is_within(bound, enough);
+        if done {
+            self.floor = self.floor.min(bound);
+        }
+        done
+    }
+
+    /// Looks no further at what may hold surface that is no nearer than `bound`.
+    fn set_aside(&mut self, bound: f64, known: bool) {
+        self.floor = self.floor.min(bound);
+        if !known {
+            self.left = self.left.min(bound);
+        }
+    }
+
+    /// Whether no more boxes are kept.
+    fn is_full(&self) -> bool {
+        self.pieces.len() > if self.goes_deep() { SOON } else { MOST } || self.open > OPEN
+    }
+
+    /// Whether a leaf says how far the surface is from any point of it.
+    fn is_known(&self, item: Place) -> bool {
+        match item {
+            Place::Node(index) | Place::Leaf(index) | Place::Sheet(index, _) => self.boxes.nodes[index as usize].known > 0.0,
+            Place::Piece(index) => self.pieces[index as usize].known,
+        }
     }
 
     fn enter(&mut self, bound: f64, place: Place) {
@@ -226,8 +293,8 @@ impl<'a> Search<'a> {
                 let taylor = &self.boxes.taylors[sheet as usize];
                 if let Some(parts) = self.unproven(&node.extent) {
                     let sheet = &self.boxes.sheets[sheet as usize];
-                    for part in parts {
-                        self.part(bound, taylor, sheet, part, true);
+                    for extent in parts {
+                        self.part(bound, taylor, sheet, Piece { extent, sheet: None, fresh: true, known: node.known > 0.0 });
                     }
                     return;
                 }
@@ -245,7 +312,7 @@ impl<'a> Search<'a> {
             }
             // What may touch zero without a change of sign would be cut for nothing, or in vain.
             None if !node.is_crossed() => self.floor = self.floor.min(bound),
-            None => self.settle(bound, &Piece { extent: node.extent, sheet: None, fresh: true }),
+            None => self.settle(bound, &Piece { extent: node.extent, sheet: None, fresh: true, known: true }),
         }
     }
 
@@ -253,7 +320,7 @@ impl<'a> Search<'a> {
     fn sheet(&mut self, bound: f64, index: u32, near: DVec3) {
         let node = &self.boxes.nodes[index as usize];
         let sheet = node.sheet.map(|sheet| (self.boxes.taylors[sheet as usize], self.boxes.sheets[sheet as usize], near));
-        self.settle(bound, &Piece { extent: node.extent, sheet, fresh: true });
+        self.settle(bound, &Piece { extent: node.extent, sheet, fresh: true, known: node.known > 0.0 });
     }
 
     /// Proves how near the surface of a box is, or cuts the box.
@@ -265,8 +332,8 @@ impl<'a> Search<'a> {
         if let Some((taylor, sheet, _)) = &piece.sheet
             && let Some(parts) = self.unproven(extent)
         {
-            for part in parts {
-                self.part(bound, taylor, sheet, part, piece.fresh);
+            for extent in parts {
+                self.part(bound, taylor, sheet, Piece { extent, ..*piece });
             }
             return;
         }
@@ -277,7 +344,7 @@ impl<'a> Search<'a> {
                 return;
             }
             if size <= 0.125 * self.accuracy.smooth {
-                self.floor = self.floor.min(bound);
+                self.set_aside(bound, piece.known);
                 return;
             }
         } else {
@@ -329,12 +396,13 @@ impl<'a> Search<'a> {
                 bound = bound.max(least);
                 (taylor, sheet, near)
             });
-            self.add(bound, Piece { extent, sheet, fresh: !piece.fresh });
+            self.add(bound, Piece { extent, sheet, fresh: !piece.fresh, known: piece.known });
         }
     }
 
     /// A part of a box with a sheet.
-    fn part(&mut self, bound: f64, taylor: &Taylor, sheet: &Sheet, extent: Aabb, fresh: bool) {
+    fn part(&mut self, bound: f64, taylor: &Taylor, sheet: &Sheet, part: Piece) {
+        let extent = part.extent;
         let mut bound = bound.max(taylor.rough(self.p, &extent));
         let mut near = extent.center();
         if !self.is_enough(bound) {
@@ -347,7 +415,7 @@ impl<'a> Search<'a> {
         if self.is_enough(bound) {
             self.floor = self.floor.min(bound);
         } else {
-            self.add(bound, Piece { extent, sheet: Some((*taylor, *sheet, near)), fresh });
+            self.add(bound, Piece { sheet: Some((*taylor, *sheet, near)), ..part });
         }
     }
 
@@ -357,6 +425,10 @@ impl<'a> Search<'a> {
     }
 
     fn add(&mut self, bound: f64, piece: Piece) {
+        if !piece.known && self.goes_deep() && self.is_full() {
+            self.deep.push((bound, piece.extent));
+            return;
+        }
         self.open += usize::from(piece.sheet.is_none());
         self.pieces.push(piece);
         self.enter(bound, Place::Piece((self.pieces.len() - 1) as u32));

@@ -95,11 +95,15 @@ impl Search<'_> {
 
     /// Whether a squared lower bound is as good as wanted.
     pub(super) fn is_enough(&self, bound: f64) -> bool {
-        bound.max(0.0).sqrt() >= self.upper - self.enough()
+        self.is_within(bound, self.enough())
+    }
+
+    pub(super) fn is_within(&self, bound: f64, enough: f64) -> bool {
+        bound.max(0.0).sqrt() >= self.upper - enough
     }
 
     /// How far apart the bounds may be: where much of the surface is nearly as far, less is asked for.
-    fn enough(&self) -> f64 {
+    pub(super) fn enough(&self) -> f64 {
         if self.pieces.len() < MANY { self.accuracy.smooth } else { self.accuracy.hard }
     }
 }
