@@ -321,7 +321,15 @@ impl Builder<'_> {
     fn error(&self, block: &SampleBlock<'_>, said: &Said) -> Result<Interval> {
         let mut residual = vec![Interval::ALL; block.len()];
         self.source.residual(&block.with(block.values, &said.values), &mut residual)?;
-        Ok(said.error(block, &residual))
+        let error = said.error(block, &residual);
+        if error.lower <= error.upper {
+            return Ok(error);
+        }
+        Err(Error::invalid(format!(
+            "what the shape says of the box from {} to {} contradicts itself: its values change by more than one moves, or bend more \
+             than it says; give the true lipschitz constant, or values=\"bound\" where they are no distances",
+            block.cell.min, block.cell.max
+        )))
     }
 }
 

@@ -270,7 +270,11 @@ pub(crate) fn aged_error(error: Interval, said: Interval, before: Interval, afte
 
 impl Record {
     /// From corners and an error in double precision, which is rounded outward.
+    ///
+    /// The error takes in 0, so that what is said lies between its own bounds, however corners are rounded. One that holds
+    /// nothing, of claims that contradict each other, stays what it is.
     pub fn new(corners: [f32; 8], error: Interval) -> Self {
+        let error = if error.lower <= error.upper { error.hull(Interval::exact(0.0)) } else { error };
         Self { corners, lower: rounded_down(error.lower), upper: rounded_up(error.upper) }
     }
 }

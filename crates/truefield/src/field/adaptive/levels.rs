@@ -249,7 +249,9 @@ impl Tree for Flat<'_> {
     type Node = (u32, u32);
 
     fn record(&self, (depth, cell): Self::Node) -> Record {
-        self.levels.levels[depth as usize].records[cell as usize]
+        // Of files written before, errors need not take in 0.
+        let record = &self.levels.levels[depth as usize].records[cell as usize];
+        Record::new(record.corners, record.error())
     }
 
     fn shape(&self, (depth, cell): Self::Node, children: &mut Vec<Self::Node>) -> Shape<'_> {
