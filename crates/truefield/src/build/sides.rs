@@ -70,7 +70,7 @@ impl<'a> Sides<'a> {
             let i = farthest(answers, left);
             let p = DVec3::new(points.x[i], points.y[i], points.z[i]);
             let triangle = answers.triangle[i];
-            let (side, carry) = self.surface.steady(p, &tree.facet(triangle).nearest(p), triangle, longest);
+            let (side, carry) = self.surface.steady(p, &tree.facet(triangle).at(answers.foot(i)), triangle, longest);
             let reached = if side.is_certain() { clear.reach(1 << i, left, carry / steps[2]) } else { 1 << i };
             left &= !reached;
             for (i, out) in sides.iter_mut().enumerate() {

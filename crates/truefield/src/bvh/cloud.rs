@@ -3,9 +3,9 @@
 
 use super::cover::{OCTANTS, Range, Scratch, center_range, gather_few, refine};
 use super::evaluate::{Answers, BLOCK, Points, Rows, evaluate};
-use super::nearest::{Candidate, search_many};
+use super::nearest::{Located, search_many};
 use super::tree::{Slot, Tree};
-use crate::geom::{Aabb, DVec3};
+use crate::geom::{Aabb, DVec3, Foot};
 
 /// Points of the boxes that are given a list; it is shortened for their parts.
 const MOST: usize = 512;
@@ -22,13 +22,16 @@ const SHORT: usize = 8;
 /// Boxes farther away than so many sizes of the mesh have lists that single precision cannot shorten.
 const FAR: f64 = 64.0;
 
+/// Not answered yet.
+const UNKNOWN: Located = Located { triangle: u32::MAX, foot: Foot { distance_squared: f64::INFINITY, s: 0.0, t: 0.0 } };
+
 /// Memory that is used again from box to box.
 pub(crate) struct Cloud<'a> {
     tree: &'a Tree,
     points: &'a [DVec3],
     /// Places on a Morton curve, ascending.
     keys: &'a [u32],
-    found: Vec<Candidate>,
+    found: Vec<Located>,
     scratch: Scratch,
     rows: Rows,
     answers: Box<Answers>,
@@ -46,12 +49,12 @@ struct Part {
 }
 
 /// The nearest triangles of `points`, sorted by their places on a Morton curve.
-pub(crate) fn nearest(tree: &Tree, points: &[DVec3], keys: &[u32]) -> Vec<Candidate> {
+pub(crate) fn nearest(tree: &Tree, points: &[DVec3], keys: &[u32]) -> Vec<Located> {
     let mut cloud = Cloud {
         tree,
         points,
         keys,
-        found: vec![Candidate::within(f64::INFINITY); points.len()],
+        found: vec![UNKNOWN; points.len()],
         scratch: Scratch::default(),
         rows: Rows::default(),
         answers: Box::new(Answers::NONE),
@@ -151,9 +154,8 @@ impl Cloud<'_> {
             let range = first..(first + BLOCK).min(part.end);
             let points = Points::of_some(&self.points[range.clone()]);
             evaluate(self.tree, &part.cell, &points, list, Range::ALL, &mut self.rows, &mut self.answers);
-            let answers = self.answers.squared.iter().zip(&self.answers.triangle);
-            for (found, (&distance_squared, &triangle)) in self.found[range].iter_mut().zip(answers) {
-                *found = Candidate { distance_squared, triangle };
+            for (i, found) in self.found[range].iter_mut().enumerate() {
+                *found = Located { triangle: self.answers.triangle[i], foot: self.answers.foot(i) };
             }
         }
     }

@@ -8,7 +8,7 @@ use super::cover::{Range, filter_error};
 use super::descend::Block;
 use super::frame::Offsets;
 use super::tree::{Slot, Tree};
-use crate::geom::{Aabb, DVec3};
+use crate::geom::{Aabb, DVec3, Foot};
 use crate::grid::Grid;
 use crate::simd::{Fuse, multiversion};
 
@@ -30,12 +30,14 @@ pub(crate) struct Points {
     pub count: usize,
 }
 
-/// Squared distance and nearest triangle of every point of a block.
+/// Squared distance and nearest triangle of every point of a block, and where on the triangle its nearest point lies.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub(crate) struct Answers {
     pub squared: [f64; BLOCK],
     pub triangle: [u32; BLOCK],
+    s: [f64; BLOCK],
+    t: [f64; BLOCK],
 }
 
 impl Points {
@@ -63,7 +65,12 @@ impl Points {
 }
 
 impl Answers {
-    pub const NONE: Self = Self { squared: [f64::INFINITY; BLOCK], triangle: [u32::MAX; BLOCK] };
+    pub const NONE: Self = Self { squared: [f64::INFINITY; BLOCK], triangle: [u32::MAX; BLOCK], s: [0.0; BLOCK], t: [0.0; BLOCK] };
+
+    /// The foot of an answered point on its triangle.
+    pub fn foot(&self, i: usize) -> Foot {
+        Foot { distance_squared: self.squared[i], s: self.s[i], t: self.t[i] }
+    }
 }
 
 /// Memory that is used again from block to block.
@@ -153,14 +160,15 @@ fn exact(tree: &Tree, points: &Points, slot: Slot, chosen: &[u8], out: &mut Answ
             let i = usize::from(group[lane.min(group.len() - 1)]) % BLOCK;
             (p[0][lane], p[1][lane], p[2][lane]) = (points.x[i], points.y[i], points.z[i]);
         }
-        let mut squared = [0.0f64; GROUP];
+        let (mut squared, mut s, mut t) = ([0.0f64; GROUP], [0.0f64; GROUP], [0.0f64; GROUP]);
         for lane in 0..GROUP {
-            squared[lane] = facet.distance_squared(DVec3::new(p[0][lane], p[1][lane], p[2][lane]));
+            let foot = facet.foot(DVec3::new(p[0][lane], p[1][lane], p[2][lane]));
+            (squared[lane], s[lane], t[lane]) = (foot.distance_squared, foot.s, foot.t);
         }
         for (lane, &i) in group.iter().enumerate() {
             let i = usize::from(i) % BLOCK;
             if squared[lane] < out.squared[i] || (squared[lane] == out.squared[i] && triangle < out.triangle[i]) {
-                out.squared[i] = squared[lane];
+                (out.squared[i], out.s[i], out.t[i]) = (squared[lane], s[lane], t[lane]);
                 out.triangle[i] = triangle;
             }
         }

@@ -4,7 +4,7 @@ use super::cloud;
 use super::order::along_curve;
 use super::tree::{ABSENT, LEAF, Packet, Slot, Tree, WIDTH};
 use crate::error::Result;
-use crate::geom::DVec3;
+use crate::geom::{DVec3, Foot};
 use crate::run::Run;
 use crate::simd::{Fuse, multiversion};
 
@@ -37,6 +37,19 @@ impl Candidate {
     }
 }
 
+/// The nearest triangle of a point and the foot of the point on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Located {
+    pub triangle: u32,
+    pub foot: Foot,
+}
+
+impl Located {
+    pub fn candidate(self) -> Candidate {
+        Candidate { distance_squared: self.foot.distance_squared, triangle: self.triangle }
+    }
+}
+
 impl Tree {
     /// The nearest triangle that is not farther than `best` already is; the lowest index on ties.
     pub fn nearest(&self, p: DVec3, best: Candidate) -> Candidate {
@@ -47,23 +60,23 @@ impl Tree {
     ///
     /// Points that are near each other share what is known about a box around them; the result does not depend on it.
     pub fn nearest_many(&self, points: &[DVec3], run: &Run<'_>) -> Result<Vec<Candidate>> {
-        self.nearest_along(points, run, |_, found| found.to_vec())
+        self.nearest_along(points, run, |_, found| found.iter().map(|found| found.candidate()).collect())
     }
 
     /// What `answer` makes of points that follow each other along a space-filling curve and of their nearest triangles.
     ///
-    /// It is given some thousand points and as many candidates; which ones does not depend on the threads.
+    /// It is given some thousand points and as many answers; which ones does not depend on the threads.
     pub(crate) fn nearest_along<T: Copy + Send + Sync>(
         &self,
         points: &[DVec3],
         run: &Run<'_>,
-        answer: impl Fn(&[DVec3], &[Candidate]) -> Vec<T> + Sync,
+        answer: impl Fn(&[DVec3], &[Located]) -> Vec<T> + Sync,
     ) -> Result<Vec<T>> {
         along_curve("nearest points", points, run, |points, keys| answer(points, &self.nearest_sorted(points, keys)))
     }
 
     /// The nearest triangles of points that are sorted by their places on a Morton curve.
-    pub(crate) fn nearest_sorted(&self, points: &[DVec3], keys: &[u32]) -> Vec<Candidate> {
+    pub(crate) fn nearest_sorted(&self, points: &[DVec3], keys: &[u32]) -> Vec<Located> {
         cloud::nearest(self, points, keys)
     }
 }
@@ -71,17 +84,16 @@ impl Tree {
 multiversion!(fn search(tree: &Tree, p: DVec3, best: Candidate) -> Candidate = search_body);
 multiversion!(
     /// The nearest triangle of every point, each search starting from the answer before, the first from `warm`; returns the last answer.
-    pub(super) fn search_many(tree: &Tree, points: &[DVec3], warm: Slot, out: &mut [Candidate]) -> Slot = search_many_body
+    pub(super) fn search_many(tree: &Tree, points: &[DVec3], warm: Slot, out: &mut [Located]) -> Slot = search_many_body
 );
 
 #[inline(always)]
-fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], mut warm: Slot, out: &mut [Candidate]) -> Slot {
+fn search_many_body<F: Fuse>(tree: &Tree, points: &[DVec3], mut warm: Slot, out: &mut [Located]) -> Slot {
     for (&p, out) in points.iter().zip(out) {
         let start = Candidate { distance_squared: tree.facet_at(warm).distance_squared(p), triangle: tree.triangle(warm) };
-        *out = search_body::<F>(tree, p, start);
-        if out.found() {
-            warm = tree.slots[out.triangle as usize];
-        }
+        let triangle = search_body::<F>(tree, p, start).triangle;
+        warm = tree.slots[triangle as usize];
+        *out = Located { triangle, foot: tree.facet_at(warm).foot(p) };
     }
     warm
 }

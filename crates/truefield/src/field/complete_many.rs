@@ -94,7 +94,7 @@ impl CompleteField {
         self.offer(&lists, listed, &scaled, &mut found);
         let there: Vec<DVec3> = others.iter().map(|&point| scaled[point]).collect();
         for (point, nearest) in others.into_iter().zip(along_own_curve(&there, |points, keys| tree.nearest_sorted(points, keys))) {
-            found[point] = nearest;
+            found[point] = nearest.candidate();
         }
         (found, classes)
     }

@@ -38,7 +38,7 @@ pub struct FacetPoint {
 }
 
 /// Squared distance and where it is attained, in coordinates along `ab` and `ac`.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Foot {
     pub distance_squared: f64,
     pub s: f64,
@@ -103,7 +103,12 @@ impl Facet {
 
     /// Nearest point, its squared distance and the feature it lies on.
     pub fn nearest(&self, p: DVec3) -> FacetPoint {
-        let foot = self.foot(p);
+        self.at(self.foot(p))
+    }
+
+    /// The nearest point that [`Facet::foot`] found.
+    #[inline]
+    pub(crate) fn at(&self, foot: Foot) -> FacetPoint {
         let (s, t) = (foot.s, foot.t);
         // The three edges set exact zeros and ones, so the feature can be read off.
         let feature = if t == 0.0 {

@@ -9,6 +9,7 @@ mod plane;
 
 pub use aabb::Aabb;
 pub use affine::Affine;
+pub(crate) use facet::Foot;
 pub use facet::{Facet, FacetPoint};
 pub use glam::DVec3;
 pub use interval::Interval;

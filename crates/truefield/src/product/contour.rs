@@ -15,7 +15,7 @@ use crate::bvh::cover::Range;
 use crate::bvh::descend::{Block, Descent, Span, Step, Visit};
 use crate::bvh::evaluate::{Answers, Points, Rows, evaluate};
 use crate::error::{Error, Result};
-use crate::geom::DVec3;
+use crate::geom::{DVec3, Foot};
 use crate::grid::Grid;
 use crate::run::Run;
 use crate::source::mesh::{Side, Surface};
@@ -171,17 +171,18 @@ impl<'a> Tracer<'a> {
             if triangle == u32::MAX {
                 continue;
             }
-            let distance = sides[i].sign() * self.answers.squared[i].sqrt();
+            let foot = self.answers.foot(i);
+            let distance = sides[i].sign() * foot.distance_squared.sqrt();
             if (distance - self.distance).abs() <= self.half {
-                self.keep(DVec3::new(points.x[i], points.y[i], points.z[i]), triangle, sides[i]);
+                self.keep(DVec3::new(points.x[i], points.y[i], points.z[i]), triangle, foot, sides[i]);
             }
         }
         Step::Done
     }
 
-    fn keep(&mut self, p: DVec3, triangle: u32, side: Side) {
+    fn keep(&mut self, p: DVec3, triangle: u32, foot: Foot, side: Side) {
         let tree = self.surface.tree();
-        let foot = tree.facet(triangle).nearest(p);
+        let foot = tree.facet(triangle).at(foot);
         let normal = self.surface.normal(p, &foot, triangle, side);
         let (mut point, mut nearest) = (p, triangle);
         if self.placement == Placement::Projected {

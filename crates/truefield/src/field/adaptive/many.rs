@@ -28,7 +28,7 @@ impl AdaptiveField {
             let (places, keys): (Vec<DVec3>, Vec<u32>) = asked.map(|((&p, &key), _)| (p * surface.scale(), key)).unzip();
             let mut found = surface.tree().nearest_sorted(&places, &keys).into_iter();
             let answer = |(&p, cell): (&DVec3, Option<Cell<'_>>)| match cell.and_then(|cell| Some((cell, found.next()?))) {
-                Some((cell, nearest)) => exact(&cell, p, nearest),
+                Some((cell, nearest)) => exact(&cell, p, nearest.candidate()),
                 None => one(p),
             };
             points.iter().zip(open).map(answer).collect()

@@ -141,7 +141,7 @@ impl Surface {
         self.tree.nearest_along(points, run, |points, found| {
             let mut walk = Walk::default();
             let each = points.iter().zip(found).map(|(&p, found)| {
-                let foot = self.tree.facet(found.triangle).nearest(p);
+                let foot = self.tree.facet(found.triangle).at(found.foot);
                 answer(p, found.triangle, &foot, walk.side(self, p, found.triangle, &foot))
             });
             each.collect()
