@@ -61,8 +61,7 @@ pub(crate) fn nearest(tree: &Tree, points: &[DVec3], keys: &[u32]) -> Vec<Locate
         lists: Vec::new(),
         near: Slot(0),
     };
-    let whole = cloud.part(0, points.len());
-    cloud.seek(whole);
+    cloud.seek(0, points.len());
     cloud.found
 }
 
@@ -71,14 +70,15 @@ impl Cloud<'_> {
         Part { first, end, cell: Aabb::around(self.points[first..end].iter().copied()) }
     }
 
-    /// Answers a part whose list is not known.
-    fn seek(&mut self, part: Part) {
-        let count = part.end - part.first;
-        let reach = (part.cell.center() - self.tree.center).length() + part.cell.radius();
-        if count < FEW || !(reach <= FAR * self.tree.radius) {
-            return self.search(part);
-        }
+    /// Answers points whose list is not known.
+    fn seek(&mut self, first: usize, end: usize) {
+        let count = end - first;
         if count <= MOST {
+            let part = self.part(first, end);
+            let reach = (part.cell.center() - self.tree.center).length() + part.cell.radius();
+            if count < FEW || !(reach <= FAR * self.tree.radius) {
+                return self.search(first, end);
+            }
             let (nearest, _) = center_range(self.tree, &part.cell, self.near);
             self.near = self.tree.slots[nearest.triangle as usize];
             let witness = self.tree.facet(nearest.triangle).nearest(part.cell.center()).point;
@@ -92,12 +92,12 @@ impl Cloud<'_> {
                 return self.share(&parts[..count], &list);
             }
         }
-        let (parts, count) = self.halves(part, 2);
+        let (ends, count) = self.cuts(first, end, 2);
         if count == 1 {
-            return self.search(part);
+            return self.search(first, end);
         }
-        for part in &parts[..count] {
-            self.seek(*part);
+        for &(first, end) in &ends[..count] {
+            self.seek(first, end);
         }
     }
 
@@ -105,7 +105,7 @@ impl Cloud<'_> {
     fn shorten(&mut self, part: Part, list: &[Slot]) {
         let count = part.end - part.first;
         if list.len() > SEARCH * count {
-            return self.search(part);
+            return self.search(part.first, part.end);
         }
         if count <= BLOCK || list.len() <= SHORT {
             return self.evaluate(part, list);
@@ -125,9 +125,21 @@ impl Cloud<'_> {
         self.lists.push(lists);
     }
 
-    /// Up to `most` parts, each of one cube or half a cube of the curve, the largest halved first; one where all points have one place.
+    /// The parts of [`Cloud::cuts`].
     fn halves(&self, part: Part, most: usize) -> ([Part; OCTANTS], usize) {
-        let mut ends = [(part.first, part.end); OCTANTS];
+        let (ends, count) = self.cuts(part.first, part.end, most);
+        let mut parts = [part; OCTANTS];
+        if count > 1 {
+            for (part, &(first, end)) in parts.iter_mut().zip(&ends[..count]) {
+                *part = self.part(first, end);
+            }
+        }
+        (parts, count)
+    }
+
+    /// Up to `most` ranges, each of one cube or half a cube of the curve, the largest halved first; one where all points have one place.
+    fn cuts(&self, first: usize, end: usize, most: usize) -> ([(usize, usize); OCTANTS], usize) {
+        let mut ends = [(first, end); OCTANTS];
         let mut count = 1;
         while count < most {
             let largest = (0..count).max_by_key(|&i| (ends[i].1 - ends[i].0, usize::MAX - i)).unwrap_or(0);
@@ -142,11 +154,7 @@ impl Cloud<'_> {
             ends[count] = (middle, end);
             count += 1;
         }
-        let mut parts = [part; OCTANTS];
-        for (part, &(first, end)) in parts.iter_mut().zip(&ends[..count]) {
-            *part = self.part(first, end);
-        }
-        (parts, count)
+        (ends, count)
     }
 
     fn evaluate(&mut self, part: Part, list: &[Slot]) {
@@ -160,9 +168,8 @@ impl Cloud<'_> {
         }
     }
 
-    fn search(&mut self, part: Part) {
-        let range = part.first..part.end;
-        self.near = search_many(self.tree, &self.points[range.clone()], self.near, &mut self.found[range]);
+    fn search(&mut self, first: usize, end: usize) {
+        self.near = search_many(self.tree, &self.points[first..end], self.near, &mut self.found[first..end]);
     }
 }
 

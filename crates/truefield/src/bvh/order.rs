@@ -6,6 +6,7 @@
 use crate::error::Result;
 use crate::geom::{Aabb, DVec3};
 use crate::run::Run;
+use crate::simd::{Fuse, multiversion};
 
 /// Points of a run, sorted on its own; its answers are put in their places at once.
 const RUN: usize = 1 << 16;
@@ -33,13 +34,13 @@ pub(crate) fn along_curve<T: Copy + Send + Sync>(
     let boxes = run.blocks(phase, points.len().div_ceil(RUN), |at| Ok(around(&points[part(at, points.len())])))?;
     let curve = Curve::over(&boxes.iter().fold(Aabb::EMPTY, |all, &one| all.union(one)));
     // By a finer curve of their own: the first may have been spoilt by a point far away.
-    by_key(phase, points, run, |p| curve.place(p), |points| along_own_curve(points, &answer))
+    by_key(phase, points, run, |points| curve.places(points), |points| along_own_curve(points, &answer))
 }
 
 /// What `answer` makes of points, in their order, given them along a curve around them, with their places on it.
 pub(crate) fn along_own_curve<T: Copy>(points: &[DVec3], answer: impl FnOnce(&[DVec3], &[u32]) -> Vec<T>) -> Vec<T> {
     let curve = Curve::over(&around(points));
-    let mut places: Vec<Place> = points.iter().enumerate().map(|(i, &p)| (curve.place(p), i as u32)).collect();
+    let mut places: Vec<Place> = curve.places(points).into_iter().zip(0..).collect();
     sort(&mut places);
     let (keys, points): (Vec<u32>, Vec<DVec3>) = places.iter().map(|&(key, i)| (key, points[i as usize])).unzip();
     let sorted = answer(&points, &keys);
@@ -56,12 +57,12 @@ pub(crate) fn by_key<T: Copy + Send + Sync>(
     phase: &'static str,
     points: &[DVec3],
     run: &Run<'_>,
-    key: impl Fn(DVec3) -> u32 + Sync,
+    keys: impl Fn(&[DVec3]) -> Vec<u32> + Sync,
     answer: impl Fn(&[DVec3]) -> Vec<T> + Sync,
 ) -> Result<Vec<T>> {
     let runs = run.blocks(phase, points.len().div_ceil(RUN), |at| {
         let range = part(at, points.len());
-        let mut places: Vec<Place> = points[range.clone()].iter().zip(range).map(|(&p, i)| (key(p), i as u32)).collect();
+        let mut places: Vec<Place> = keys(&points[range.clone()]).into_iter().zip(range.start as u32..).collect();
         sort(&mut places);
         Ok(places)
     })?;
@@ -128,10 +129,39 @@ impl Curve {
         Self { origin: extent.min, scale }
     }
 
-    pub fn place(&self, p: DVec3) -> u32 {
-        let q = (p - self.origin) * self.scale;
-        let spread = |x: f64| spread_bits((x as u32).min((1 << BITS) - 1));
-        spread(q.x) | spread(q.y) << 1 | spread(q.z) << 2
+    /// Places of points, in their order.
+    pub fn places(&self, points: &[DVec3]) -> Vec<u32> {
+        let mut out = vec![0; points.len()];
+        places(self, points, &mut out);
+        out
+    }
+}
+
+multiversion!(fn places(curve: &Curve, points: &[DVec3], out: &mut [u32]) = places_body);
+
+/// Points placed side by side.
+const LANES: usize = 16;
+
+#[inline(always)]
+fn places_body<F: Fuse>(curve: &Curve, points: &[DVec3], out: &mut [u32]) {
+    let most = f64::from((1u32 << BITS) - 1);
+    // What is added to it is rounded to a whole number, which its lowest bits hold.
+    let whole = (1u64 << 52) as f64;
+    for (points, out) in points.chunks(LANES).zip(out.chunks_mut(LANES)) {
+        let mut cell = [[0u32; LANES]; 3];
+        for (lane, p) in points.iter().enumerate() {
+            let q = (*p - curve.origin) * curve.scale;
+            for axis in 0..3 {
+                let x = if q[axis] > 0.0 { q[axis] } else { 0.0 };
+                cell[axis][lane] = ((if x < most { x } else { most }) + whole).to_bits() as u32;
+            }
+        }
+        let mut place = [0u32; LANES];
+        for lane in 0..LANES {
+            let spread = |axis: usize| spread_bits(cell[axis][lane] & ((1 << BITS) - 1));
+            place[lane] = spread(0) | spread(1) << 1 | spread(2) << 2;
+        }
+        out.copy_from_slice(&place[..points.len()]);
     }
 }
 

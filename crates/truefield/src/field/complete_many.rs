@@ -45,8 +45,7 @@ impl CompleteField {
         answer: impl Fn(DVec3, Candidate, CellClass) -> T + Sync,
     ) -> Result<Vec<T>> {
         check_points(points)?;
-        let key = self.keys();
-        by_key("query the field", points, run, key, |points| {
+        by_key("query the field", points, run, self.keys(), |points| {
             let (found, classes) = self.search_many(points);
             points.iter().zip(found).zip(classes).map(|((&p, found), class)| answer(p, found, class)).collect()
         })
@@ -54,19 +53,24 @@ impl CompleteField {
 
     /// About the number of a point's block: near an edge of blocks it may be a neighbour's. Points beyond the cells come
     /// after the others, with their neighbours.
-    fn keys(&self) -> impl Fn(DVec3) -> u32 + Sync {
+    fn keys(&self) -> impl Fn(&[DVec3]) -> Vec<u32> + Sync {
         let (extent, [_, ny, nz]) = (self.grid().extent(), self.block_shape().map(|n| n as u32));
         let beyond = Curve::over(&extent.grow(extent.size().max_element()));
         let (low, _) = block_range(self.grid());
         let edge = EDGE as f64 * self.grid().spacing;
         let (origin, scale) = (self.grid().origin + DVec3::from(low.map(|i| i as f64)) * edge, edge.recip());
         let blocks = self.blocks.len() as u32;
-        move |p| {
-            if !extent.contains(p) {
-                return blocks + (beyond.place(p) >> COARSE);
-            }
-            let block = (p - origin) * scale;
-            (block.x as u32 * ny + block.y as u32) * nz + block.z as u32
+        move |points| {
+            let others: Vec<DVec3> = points.iter().copied().filter(|&p| !extent.contains(p)).collect();
+            let mut others = beyond.places(&others).into_iter();
+            let key = |&p: &DVec3| {
+                if !extent.contains(p) {
+                    return blocks + (others.next().unwrap_or(0) >> COARSE);
+                }
+                let block = (p - origin) * scale;
+                (block.x as u32 * ny + block.y as u32) * nz + block.z as u32
+            };
+            points.iter().map(key).collect()
         }
     }
 
