@@ -381,3 +381,39 @@ fn sizes_whose_powers_are_no_numbers_are_refused() {
         }
     }
 }
+
+/// The patch through 4 x 4 points of a surface.
+fn through(at: impl Fn(f64, f64) -> DVec3) -> Bezier {
+    let cubic =
+        |[a, b, c, d]: [DVec3; 4]| [a, (a * -5.0 + b * 18.0 - c * 9.0 + d * 2.0) / 6.0, (a * 2.0 - b * 9.0 + c * 18.0 - d * 5.0) / 6.0, d];
+    let rows: [[DVec3; 4]; 4] = std::array::from_fn(|i| cubic(std::array::from_fn(|j| at(i as f64 / 3.0, j as f64 / 3.0))));
+    let columns: [[DVec3; 4]; 4] = std::array::from_fn(|j| cubic(std::array::from_fn(|i| rows[i][j])));
+    Bezier(std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i])))
+}
+
+/// From the axis of a paraboloid a ring is as near, and from the middle of a cap of a ball all of it.
+#[test]
+fn values_are_as_near_as_they_say_where_much_is_as_near() {
+    let bowl = patches(&[through(|u, v| DVec3::new(u - 0.5, v - 0.5, 0.5 * ((u - 0.5).powi(2) + (v - 0.5).powi(2))))], Sides::Unsigned);
+    for z in [0.2, 0.99, 1.0, 1.0 + 1e-6, 1.001, 1.01, 1.05, 1.1] {
+        let p = DVec3::new(0.0, 0.0, z);
+        let truth = if z > 1.0 { (2.0 * z - 1.0_f64).sqrt() } else { z };
+        let (at, value, slack) = (bowl.at(p), value(&bowl, p), bowl.slack(&Aabb::new(p, p).grow(1e-3)));
+        assert!(at.contains(truth) && at.width() < 1e-9, "{truth} at {p} is not in {at:?}");
+        assert!(slack.contains(truth - value) && slack.width() < 1e-9, "{value} at {p} is not {truth} within {slack:?}");
+    }
+    let turned = |u: f64, v: f64, part: f64| DVec3::new(u.sin(), v.sin() * u.cos(), v.cos() * u.cos()) * part;
+    for size in [0.3, 0.03] {
+        let cap = patches(&[through(|u, v| turned((u - 0.5) * size, (v - 0.5) * size, 1.0))], Sides::Unsigned);
+        for way in [0.0, 1e-9, 1e-6, 1e-3] {
+            let p = turned(0.1 * size, 0.2 * size, way);
+            let (at, mut value) = (cap.at(p), [0.0]);
+            // A patch is no ball: it may be as near as its own error, and a value is near or none.
+            assert!(at.contains(1.0 - way) || (at.lower - 1.0 + way).abs() < size.powi(4), "{at:?} at {p}");
+            match cap.values(&[p], &mut value) {
+                Ok(()) => assert!(value[0] >= at.lower && value[0] <= at.upper, "{value:?} at {p} is not in {at:?}"),
+                Err(refusal) => assert!(refusal.to_string().contains("only known") && at.width() > cap.noise(), "{refusal}"),
+            }
+        }
+    }
+}

@@ -13,8 +13,8 @@ pub(super) struct Bends {
     center: DVec3,
     /// No more than the second derivatives along u u and v v seen from the centre.
     least: [f64; 2],
-    /// No less than the size of the one along u v.
-    most: f64,
+    /// Contains the one along u v.
+    mixed: Interval,
     /// Boxes of x_uu, x_uv and x_vv.
     second: [Span; 3],
     /// What the slopes along u and v are seen from the centre.
@@ -76,7 +76,7 @@ impl Bends {
         Self {
             center,
             least: [of_uu.lower * x * x, of_vv.lower * y * y],
-            most: of_uv.lower.abs().max(of_uv.upper.abs()) * x * y,
+            mixed: Interval { lower: of_uv.lower * x * y, upper: of_uv.upper * x * y },
             second: [span(uu, x * x), span(uv, x * y), span(vv, y * y)],
             slopes: [(of_u, x), (of_v, y)].map(|(slope, scale)| Interval { lower: slope.lower * scale, upper: slope.upper * scale }),
             first: [span(u, x), span(v, y)],
@@ -84,46 +84,49 @@ impl Bends {
         }
     }
 
-    /// For all points that are no farther from `p`, along each axis, than `spread`, if it is certain to be convex.
+    /// Seen from `p`, if it is certain to be convex.
+    ///
+    /// Rounding of q x_ij may hide bends of that size, which over the part make up some units in the last place of the distance.
     #[inline(always)]
-    pub fn convex(&self, p: DVec3, spread: DVec3) -> Option<Convex> {
-        let [uu, vv, mixed] = self.seen_from(p, spread);
+    pub fn convex(&self, p: DVec3) -> Option<Convex> {
+        let ([uu, vv], range) = self.seen_from(p);
+        let mixed = range.upper.max(-range.lower);
         let determinant = uu * vv - mixed * mixed;
         (uu > 0.0 && vv > 0.0 && determinant > CONDITION * (uu * vv)).then_some(Convex { uu, vv, mixed, determinant })
     }
 
-    /// The least along u u and v v, and the most along u v.
+    /// The least along u u and v v, and what contains the one along u v.
     #[inline(always)]
-    fn seen_from(&self, p: DVec3, spread: DVec3) -> [f64; 3] {
+    fn seen_from(&self, p: DVec3) -> ([f64; 2], Interval) {
         let q = p - self.center;
-        let aside = q.abs() + spread;
+        let aside = q.abs();
         let [u, mixed, v] = &self.second;
-        [
-            self.least[0] - u.most(q, spread, aside),
-            self.least[1] - v.most(q, spread, aside),
-            self.most + mixed.most(q, spread, aside).max(-mixed.least(q, spread, aside)),
-        ]
+        let least = [self.least[0] - u.most(q, aside), self.least[1] - v.most(q, aside)];
+        (least, Interval { lower: self.mixed.lower - mixed.most(q, aside), upper: self.mixed.upper - mixed.least(q, aside) })
     }
 
-    /// How far the squared distance to `p` may be below its tangent in the middle of the rectangle.
-    pub fn droop(&self, p: DVec3, size: [f64; 2]) -> f64 {
-        let [uu, vv, mixed] = self.seen_from(p, DVec3::ZERO);
+    /// How far the squared distance to `p` may be below its tangent in the middle of the rectangle, and below its expansion of
+    /// second order there, by the second derivatives of half of it.
+    pub fn droop(&self, p: DVec3, size: [f64; 2], [at_uu, at_vv, at_uv]: [f64; 3]) -> [f64; 2] {
+        let ([uu, vv], range) = self.seen_from(p);
         let [x, y] = size.map(|size| 0.5 * size);
+        let below = |uu: f64, vv: f64, uv: f64| (uu.max(0.0) * x * x + vv.max(0.0) * y * y + 2.0 * uv.max(0.0) * x * y) * (1.0 + 1e-12);
         // What is convex along u and along v balances that much of the rest.
-        let rest = (mixed - (uu.max(0.0) * vv.max(0.0)).sqrt()).max(0.0);
-        ((-uu).max(0.0) * x * x + (-vv).max(0.0) * y * y + 2.0 * rest * x * y) * (1.0 + 1e-12)
+        let mixed = range.upper.max(-range.lower);
+        let rest = mixed - (uu.max(0.0) * vv.max(0.0)).sqrt();
+        [below(-uu, -vv, rest), below(at_uu - uu, at_vv - vv, (range.upper - at_uv).max(at_uv - range.lower))]
     }
 
     /// The ends at which the nearest points lie, where along u, along v or along both the distance only grows or only falls,
     /// and how it bends along the rest; `None` where neither is so or the rest is not convex.
     #[inline(always)]
-    pub fn at_edge(&self, p: DVec3, spread: DVec3) -> Option<([Option<End>; 2], Convex)> {
+    pub fn at_edge(&self, p: DVec3) -> Option<([Option<End>; 2], Convex)> {
         let q = p - self.center;
-        let aside = q.abs() + spread;
+        let aside = q.abs();
         let end = |k: usize| {
-            if self.slopes[k].lower - self.first[k].most(q, spread, aside) > 0.0 {
+            if self.slopes[k].lower - self.first[k].most(q, aside) > 0.0 {
                 Some(End::Low)
-            } else if self.slopes[k].upper - self.first[k].least(q, spread, aside) < 0.0 {
+            } else if self.slopes[k].upper - self.first[k].least(q, aside) < 0.0 {
                 Some(End::High)
             } else {
                 None
@@ -136,7 +139,7 @@ impl Bends {
                 ends[1 - k] = ends[1 - k].or(Some(End::Low));
             }
         }
-        let along = |k: usize| if ends[k].is_some() { 1.0 } else { self.least[k] - self.second[2 * k].most(q, spread, aside) };
+        let along = |k: usize| if ends[k].is_some() { 1.0 } else { self.least[k] - self.second[2 * k].most(q, aside) };
         let (uu, vv) = (along(0), along(1));
         let decided = ends != [None; 2] && uu > 0.0 && vv > 0.0;
         decided.then_some((ends, Convex { uu, vv, mixed: 0.0, determinant: uu * vv }))
@@ -144,21 +147,21 @@ impl Bends {
 
     /// The determinant seen from the middle of the part, if it is convex from there.
     pub fn determinant(&self) -> f64 {
-        self.convex(self.center, DVec3::ZERO).map_or(0.0, |convex| convex.determinant)
+        self.convex(self.center).map_or(0.0, |convex| convex.determinant)
     }
 }
 
 impl Span {
-    /// No less than the inner products of its vectors with those between q - spread and q + spread; `aside` is |q| + spread.
+    /// No less than the inner products of its vectors with q; `aside` is |q|.
     #[inline(always)]
-    fn most(&self, q: DVec3, spread: DVec3, aside: DVec3) -> f64 {
-        q.dot(self.middle) + (spread.dot(self.middle.abs()) + aside.dot(self.half))
+    fn most(&self, q: DVec3, aside: DVec3) -> f64 {
+        q.dot(self.middle) + aside.dot(self.half)
     }
 
     /// No more than them.
     #[inline(always)]
-    fn least(&self, q: DVec3, spread: DVec3, aside: DVec3) -> f64 {
-        q.dot(self.middle) - (spread.dot(self.middle.abs()) + aside.dot(self.half))
+    fn least(&self, q: DVec3, aside: DVec3) -> f64 {
+        q.dot(self.middle) - aside.dot(self.half)
     }
 }
 

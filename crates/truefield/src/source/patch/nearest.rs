@@ -21,8 +21,20 @@ const WALK: usize = 5;
 /// Of what is asked for: beyond it, a step costs little and the answers are good to rounding.
 const GOAL: f64 = 1.0 / 64.0;
 
-/// Pieces that one search makes at most.
+/// Pieces that one search keeps at most.
 const MOST: usize = 20_000;
+
+/// Pieces that it makes at most where values are asked for, in some seconds.
+const DEEPEST: usize = 1_000_000;
+
+/// What a search does about points that much of the surface is nearly as far from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Effort {
+    /// It is cut off: bounds hold, and may be far apart.
+    Short,
+    /// It goes on, depth first, at fifty times the pieces.
+    Whole,
+}
 
 /// What waits at most: a tree of four billion patches is 16 nodes deep.
 const DEPTH: usize = 16 * WIDTH;
@@ -56,11 +68,11 @@ struct Found {
 
 multiversion!(
     /// The nearest point, its distance to `accuracy` wherever the search can be brought to an end.
-    pub(super) fn nearest(tree: &Tree, p: DVec3, accuracy: f64) -> Foot = nearest_body
+    pub(super) fn nearest(tree: &Tree, p: DVec3, accuracy: f64, effort: Effort) -> Foot = nearest_body
 );
 
 #[inline(always)]
-fn nearest_body<F: Fuse>(tree: &Tree, p: DVec3, accuracy: f64) -> Foot {
+fn nearest_body<F: Fuse>(tree: &Tree, p: DVec3, accuracy: f64, effort: Effort) -> Foot {
     let mut best = Found { lower: f64::INFINITY, upper: f64::INFINITY, square: f64::INFINITY, point: DVec3::NAN, place: None };
     let mut rest = Vec::new();
     let mut stack = [(0.0, 0); DEPTH];
@@ -110,11 +122,16 @@ fn nearest_body<F: Fuse>(tree: &Tree, p: DVec3, accuracy: f64) -> Foot {
     best.lower = best.lower.min(best.upper);
     rest.retain(|(bound, _)| *bound < best.upper);
     if !rest.is_empty() {
-        take_apart(tree, p, accuracy, &rest, &mut best);
+        take_apart(tree, p, accuracy, effort, &rest, &mut best);
     }
-    let rounding = 64.0 * f64::EPSILON * (p.abs().max_element() + tree.size);
+    let rounding = rounding(tree, p.abs().max_element());
     let lower = (best.lower.max(0.0).sqrt() - rounding).max(0.0);
     Foot { lower, upper: best.upper.sqrt() + rounding, value: best.square.sqrt(), point: best.point, place: best.place }
+}
+
+/// What rounding may do to distances of points with coordinates as large as that.
+pub(super) fn rounding(tree: &Tree, size: f64) -> f64 {
+    64.0 * f64::EPSILON * (size + tree.size)
 }
 
 impl Found {
@@ -221,13 +238,13 @@ impl Part {
     #[inline(always)]
     fn solve(&self, tree: &Tree, p: DVec3, accuracy: f64, best: &mut Found) -> bool {
         self.solve_inside(tree, p, accuracy, best)
-            || self.bends.at_edge(p, DVec3::ZERO).is_some_and(|(ends, convex)| newton(tree, self, p, ends, &convex, accuracy, best))
+            || self.bends.at_edge(p).is_some_and(|(ends, convex)| newton(tree, self, p, ends, &convex, accuracy, best))
     }
 
     /// The same where the part is convex as seen from `p`; elsewhere looks at its middle.
     #[inline(always)]
     fn solve_inside(&self, tree: &Tree, p: DVec3, accuracy: f64, best: &mut Found) -> bool {
-        let Some(convex) = self.bends.convex(p, DVec3::ZERO) else {
+        let Some(convex) = self.bends.convex(p) else {
             best.see(self.middle.at, p);
             return false;
         };
@@ -257,23 +274,41 @@ impl Part {
         let middle = &self.middle;
         let way = middle.at - p;
         let fall = way.dot(middle.u).abs() * (self.high[0] - self.low[0]) + way.dot(middle.v).abs() * (self.high[1] - self.low[1]);
-        let noise = 64.0 * f64::EPSILON * (p.abs().max_element() + middle.at.abs().max_element()) * (way.length() + self.reach);
-        way.length_squared() - fall - noise
+        way.length_squared() - fall - self.noise(p, way)
     }
 
-    /// No more than the squared distance to any of its points: the tangent, less how it bends at most away from it.
+    /// No more than the squared distance to any of its points: the tangent, less how it bends at most away from it; or the
+    /// expansion of second order, less how second derivatives differ: where a curve of points is as near, that loses the third
+    /// power of the size only.
     fn least(&self, p: DVec3) -> f64 {
-        self.tangent(p) - self.bends.droop(p, [self.high[0] - self.low[0], self.high[1] - self.low[1]])
+        let size = [self.high[0] - self.low[0], self.high[1] - self.low[1]];
+        let (way, slope, [uu, vv], uv) = self.expansion(p);
+        let [below_tangent, below_square] = self.bends.droop(p, size, [uu, vv, uv]);
+        let [x, y] = size.map(|size| 0.5 * size);
+        let noise = self.noise(p, way) + 1e-14 * (uu.abs() * x * x + vv.abs() * y * y + 2.0 * uv.abs() * x * y);
+        let square = way.length_squared() + least_square(slope, [uu, vv], uv, [x, y]) - below_square - noise;
+        square.max(self.tangent(p) - below_tangent)
+    }
+
+    /// The way to the middle, the slope of half the squared distance there, and its second derivatives along u u, v v and u v.
+    #[inline(always)]
+    fn expansion(&self, p: DVec3) -> (DVec3, [f64; 2], [f64; 2], f64) {
+        let middle = &self.middle;
+        let way = middle.at - p;
+        let bend = [middle.u.length_squared() + way.dot(middle.uu), middle.v.length_squared() + way.dot(middle.vv)];
+        (way, [way.dot(middle.u), way.dot(middle.v)], bend, middle.u.dot(middle.v) + way.dot(middle.uv))
+    }
+
+    /// What rounding does to squared distances of its points.
+    #[inline(always)]
+    fn noise(&self, p: DVec3, way: DVec3) -> f64 {
+        64.0 * f64::EPSILON * (p.abs().max_element() + self.middle.at.abs().max_element()) * (way.length() + self.reach)
     }
 
     /// Where Newton's method starts: after one step from the middle.
     #[inline(always)]
     fn start(&self, p: DVec3, low: [f64; 2], high: [f64; 2]) -> [f64; 2] {
-        let middle = &self.middle;
-        let way = middle.at - p;
-        let slope = [way.dot(middle.u), way.dot(middle.v)];
-        let bend = [middle.u.length_squared() + way.dot(middle.uu), middle.v.length_squared() + way.dot(middle.vv)];
-        let mixed = middle.u.dot(middle.v) + way.dot(middle.uv);
+        let (_, slope, bend, mixed) = self.expansion(p);
         let center = [0.5 * (self.low[0] + self.high[0]), 0.5 * (self.low[1] + self.high[1])];
         let room = [[low[0] - center[0], high[0] - center[0]], [low[1] - center[1], high[1] - center[1]]];
         let step = step(slope, bend, mixed, [false; 2], room);
@@ -282,34 +317,84 @@ impl Part {
     }
 }
 
+/// The least of 2 s t + t B t for t within a rectangle around 0 of these half sizes, with s a slope and B second derivatives.
+///
+/// If it is not on an edge, it is where the slope vanishes.
+fn least_square(slope: [f64; 2], bend: [f64; 2], mixed: f64, half: [f64; 2]) -> f64 {
+    let at = |t: [f64; 2]| (0..2).map(|k| (2.0 * slope[k] + bend[k] * t[k]) * t[k]).sum::<f64>() + 2.0 * mixed * t[0] * t[1];
+    let mut least = f64::INFINITY;
+    for k in 0..2 {
+        for held in [-half[k], half[k]] {
+            let along = -(slope[1 - k] + mixed * held) / bend[1 - k];
+            for free in [-half[1 - k], half[1 - k], along.clamp(-half[1 - k], half[1 - k])] {
+                if free.is_finite() {
+                    least = least.min(at(if k == 0 { [held, free] } else { [free, held] }));
+                }
+            }
+        }
+    }
+    let determinant = bend[0] * bend[1] - mixed * mixed;
+    let still = [0, 1].map(|k| (mixed * slope[1 - k] - bend[1 - k] * slope[k]) / determinant);
+    if determinant > 0.0 && still[0].abs() < half[0] && still[1].abs() < half[1] { least.min(at(still)) } else { least }
+}
+
 /// Goes on with parts that no bound decided, halving them, the nearest first.
 #[inline(never)]
-fn take_apart(tree: &Tree, p: DVec3, accuracy: f64, rest: &[(f64, u32)], best: &mut Found) {
+fn take_apart(tree: &Tree, p: DVec3, accuracy: f64, effort: Effort, rest: &[(f64, u32)], best: &mut Found) {
     let mut heap = BinaryHeap::new();
     let mut halves: Vec<Half> = Vec::new();
+    let (mut deep, mut made) = (Vec::new(), 0);
     for (number, &(bound, part)) in rest.iter().enumerate() {
         heap.push(Waiting { bound, number, item: number });
         halves.push(tree.half(&tree.parts[part as usize]));
     }
-    let reached = |bound: f64, best: &Found| bound.max(0.0).sqrt() >= best.upper.sqrt() - accuracy;
     while let Some(Waiting { bound, item, .. }) = heap.pop() {
-        if reached(bound, best) || halves.len() > MOST {
+        if is_reached(bound, accuracy, best) {
             best.lower = best.lower.min(bound);
             break;
         }
-        for half in halves[item].halves() {
-            let part = tree.part(&half);
-            let boxes = half.piece.extent().distance_squared(p) * (1.0 - 8.0 * f64::EPSILON);
-            let bound = bound.max(boxes).max(part.oriented.distance_squared(p)).max(part.least(p));
-            if reached(bound, best) {
-                best.lower = best.lower.min(bound);
-            } else if !part.solve(tree, p, accuracy, best) {
-                part.walk(tree, p, best);
+        if halves.len() <= MOST {
+            let whole = halves[item].clone();
+            cut(tree, p, accuracy, bound, &whole, best, |bound, half| {
                 heap.push(Waiting { bound, number: halves.len(), item: halves.len() });
                 halves.push(half);
+            });
+        } else if effort == Effort::Short {
+            best.lower = best.lower.min(bound);
+            break;
+        } else {
+            deep.push((bound, halves[item].clone()));
+            // Depth first, which takes no room.
+            while let Some((bound, half)) = deep.pop() {
+                if is_reached(bound, accuracy, best) || made > DEEPEST {
+                    best.lower = best.lower.min(bound);
+                } else {
+                    made += 2;
+                    cut(tree, p, accuracy, bound, &half, best, |bound, half| deep.push((bound, half)));
+                }
             }
         }
     }
     best.lower = best.lower.min(best.upper);
     best.square = best.square.clamp(best.lower, best.upper);
+}
+
+/// Whether a squared lower bound is as good as wanted.
+fn is_reached(bound: f64, accuracy: f64, best: &Found) -> bool {
+    bound.max(0.0).sqrt() >= best.upper.sqrt() - accuracy
+}
+
+/// Halves a part whose squared lower bound is known, and hands out what no bound decides.
+fn cut(tree: &Tree, p: DVec3, accuracy: f64, bound: f64, whole: &Half, best: &mut Found, mut keep: impl FnMut(f64, Half)) {
+    for half in whole.halves() {
+        let part = tree.part(&half);
+        let boxes = half.piece.extent().distance_squared(p) * (1.0 - 8.0 * f64::EPSILON);
+        let bound = bound.max(boxes).max(part.oriented.distance_squared(p)).max(part.least(p));
+        if is_reached(bound, accuracy, best) {
+            best.lower = best.lower.min(bound);
+        } else if !part.solve(tree, p, accuracy, best) {
+            part.walk(tree, p, best);
+            keep(bound, half);
+        }
+    }
 }

@@ -1,18 +1,14 @@
 //! A set of patches ready to be asked.
 
-use super::bends::Bends;
 use super::bezier::Bezier;
-use super::nearest::{Foot, nearest};
+use super::nearest::{Effort, Foot, nearest, rounding};
 use super::side::Sided;
-use super::tree::{Half, NONE, PART, Tree};
+use super::tree::Tree;
 use crate::distance::{Distance, SampleBlock, Source};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Interval};
 use crate::run::Run;
 use crate::source::balls;
-
-/// Halvings of a part that are tried for a whole cell.
-const FINER: u32 = 4;
 
 /// Where the way to the nearest point is no more than this many times the accuracy, its direction is not relied on.
 const TOUCHING: f64 = 1e5;
@@ -64,7 +60,7 @@ impl Patches {
         let accuracy = 1e-11 * (tree.extent.diagonal() + tree.size);
         let sides = match sides {
             Sides::Unsigned => None,
-            Sides::Closed => Some(Sided::new(patches, accuracy, |p| nearest(&tree, p, accuracy), run)?),
+            Sides::Closed => Some(Sided::new(patches, accuracy, |p| nearest(&tree, p, accuracy, Effort::Short), run)?),
         };
         Ok(Self { tree, sides, accuracy })
     }
@@ -76,63 +72,24 @@ impl Patches {
 
     /// The nearest point of the patches.
     pub fn foot(&self, p: DVec3) -> DVec3 {
-        self.search(p).point
+        self.search(p, Effort::Short).point
     }
 
-    fn search(&self, p: DVec3) -> Foot {
-        nearest(&self.tree, p, self.accuracy)
-    }
-
-    /// Whether searches from all points of a cell certainly end at once: near it, all parts are convex.
-    fn is_simple(&self, cell: &Aabb, reach: f64) -> bool {
-        let square = reach * reach * (1.0 + 1e-12);
-        let near = |extent: &Aabb| (extent.min - cell.max).max(cell.min - extent.max).max(DVec3::ZERO).length_squared() <= square;
-        let (center, spread) = (cell.center(), 0.5 * cell.size() * (1.0 + 1e-12));
-        let beyond = (reach + cell.radius()).powi(2) * (1.0 + 1e-12);
-        let mut pending = vec![self.tree.root];
-        let mut halves: Vec<(Half, u32)> = Vec::new();
-        while let Some(node) = pending.pop() {
-            for (_, child) in self.tree.nodes[node as usize].each().filter(|(extent, _)| near(extent)) {
-                if child & PART == 0 {
-                    pending.push(child);
-                    continue;
-                }
-                let part = &self.tree.parts[(child & !PART) as usize];
-                if part.oriented.distance_squared(center) > beyond || part.bends.convex(center, spread).is_some() {
-                    continue;
-                }
-                if part.node != NONE {
-                    pending.push(part.node);
-                } else if part.bends.at_edge(center, spread).is_none() {
-                    halves.push((self.tree.half(part), FINER));
-                }
-            }
-            while let Some((whole, levels)) = halves.pop() {
-                if levels == 0 {
-                    return false;
-                }
-                for half in whole.halves() {
-                    let simple = |bends: &Bends| bends.convex(center, spread).is_some() || bends.at_edge(center, spread).is_some();
-                    if near(half.piece.extent()) && !simple(&half.bends()) {
-                        halves.push((half, levels - 1));
-                    }
-                }
-            }
-        }
-        true
+    fn search(&self, p: DVec3, effort: Effort) -> Foot {
+        nearest(&self.tree, p, self.accuracy, effort)
     }
 
     /// -1 inside, 1 outside or where there is no inside; `None` where that is not certain.
     fn side(&self, p: DVec3, found: Foot) -> Option<f64> {
-        self.sides.as_ref().map_or(Some(1.0), |sided| sided.side(p, found, |p| self.search(p)))
+        self.sides.as_ref().map_or(Some(1.0), |sided| sided.side(p, found, |p| self.search(p, Effort::Short)))
     }
 
-    /// The distance and its best guess, where the side is certain; and the nearest point.
-    fn answer(&self, p: DVec3) -> (Interval, Option<f64>) {
+    /// The distance and its best guess, where the side is certain.
+    fn answer(&self, p: DVec3, effort: Effort) -> (Interval, Option<f64>) {
         if !p.is_finite() {
             return (Interval::ALL, None);
         }
-        let found = self.search(p);
+        let found = self.search(p, effort);
         let size = Interval { lower: found.lower, upper: found.upper };
         match self.side(p, found) {
             Some(side) if side > 0.0 => (size, Some(found.value)),
@@ -140,6 +97,20 @@ impl Patches {
             None => (Interval::either_side(found.upper), (found.upper <= 4.0 * self.accuracy).then_some(0.0)),
         }
     }
+
+    /// How far values are from distances at most, at points with coordinates as large as that.
+    fn off(&self, size: f64) -> f64 {
+        self.noise() + 4.0 * rounding(&self.tree, size)
+    }
+}
+
+/// Where a search ends before bounds meet.
+fn open(p: DVec3, bounds: Interval) -> Error {
+    Error::invalid(format!(
+        "the distance at {p} is only known to be from {} to {}: much of the patches is about as far; take bounds there, or patches \
+         that are less like a ball around it",
+        bounds.lower, bounds.upper
+    ))
 }
 
 fn uncertain(p: DVec3) -> Error {
@@ -152,15 +123,21 @@ impl Distance for Patches {
     }
 
     fn at(&self, p: DVec3) -> Interval {
-        self.answer(p).0
+        self.answer(p, Effort::Short).0
     }
 }
 
 impl Source for Patches {
-    /// Fails where the side is not certain: next to places where the patches meet themselves.
+    /// Fails where the side is not certain, next to places where the patches meet themselves; and where they are so much like a
+    /// ball around the point that a million pieces do not tell how near they are.
     fn values(&self, points: &[DVec3], out: &mut [f64]) -> Result<()> {
         for (&p, out) in points.iter().zip(out) {
-            *out = self.answer(p).1.ok_or_else(|| uncertain(p))?;
+            let (bounds, value) = self.answer(p, Effort::Whole);
+            *out = value.ok_or_else(|| uncertain(p))?;
+            // The value lies between both, or is 0 next to the surface.
+            if *out != 0.0 && bounds.width() > self.off(p.abs().max_element()) {
+                return Err(open(p, bounds));
+            }
         }
         Ok(())
     }
@@ -168,7 +145,7 @@ impl Source for Patches {
     /// Away from the nearest point; on the surface its normal, and nothing where that is not known or distances have no sign.
     fn gradients(&self, points: &[DVec3], out: &mut [DVec3]) -> Result<()> {
         for (&p, out) in points.iter().zip(out) {
-            let found = self.search(p);
+            let found = self.search(p, Effort::Short);
             *out = if found.upper > TOUCHING * self.accuracy {
                 (p - found.point).normalize_or_zero() * self.side(p, found).ok_or_else(|| uncertain(p))?
             } else if self.is_closed() {
@@ -180,17 +157,14 @@ impl Source for Patches {
         Ok(())
     }
 
+    /// Not known: how near a nearest point is says little of where it lies.
+    fn tilt(&self, _: DVec3) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Values are as near as that, or are none.
     fn slack(&self, cell: &Aabb) -> Interval {
-        let center = cell.center();
-        let (at, value) = self.answer(center);
-        let radius = cell.radius() * (1.0 + 1e-12);
-        let reach = at.upper.max(-at.lower) + radius;
-        if self.is_simple(cell, reach) {
-            return Interval::around(0.0, self.noise());
-        }
-        // Both change by no more than one moves.
-        let (value, moved) = (value.unwrap_or(0.0), 2.0 * radius + self.noise());
-        Interval { lower: at.lower - value - moved, upper: at.upper - value + moved }
+        Interval::around(0.0, self.noise_over(cell))
     }
 
     /// A distance bends no more than that of a point.
@@ -211,5 +185,10 @@ impl Source for Patches {
 
     fn noise(&self) -> f64 {
         4.0 * self.accuracy
+    }
+
+    /// Far away, rounding adds to it.
+    fn noise_over(&self, cell: &Aabb) -> f64 {
+        self.off(cell.min.abs().max(cell.max.abs()).max_element())
     }
 }

@@ -224,11 +224,4 @@ impl Node {
         }
         squared.map(|squared| squared * (1.0 - 8.0 * f64::EPSILON))
     }
-
-    /// The boxes, and what lies in them.
-    pub fn each(&self) -> impl Iterator<Item = (Aabb, u32)> + '_ {
-        let corner = |corners: &[[f64; WIDTH]; 3], lane: usize| DVec3::from_array(corners.map(|axis| axis[lane]));
-        let lanes = (0..WIDTH).filter(|lane| self.children[*lane] != NONE);
-        lanes.map(move |lane| (Aabb::new(corner(&self.min, lane), corner(&self.max, lane)), self.children[lane]))
-    }
 }
