@@ -26,6 +26,8 @@ pub(crate) struct Boundary {
 #[derive(Clone, Copy, Debug)]
 struct Node {
     bounds: Aabb,
+    /// Diagonal of the box.
+    size: f64,
     /// Length of the edges, each as many times as it counts.
     length: f64,
     /// Length of their sum as vectors.
@@ -61,7 +63,7 @@ impl Boundary {
         let length = items.iter().map(|item| item.1.length()).sum::<f64>() * (1.0 + 1e-9);
         // Rounding of coordinates may keep a loop from closing.
         let sum = items.iter().map(|item| item.1).sum::<DVec3>().length() + length * 1e-9;
-        self.nodes.push(Node { bounds, length, sum, skip: 0 });
+        self.nodes.push(Node { bounds, size: bounds.diagonal(), length, sum, skip: 0 });
         if items.len() > LEAF {
             let size = bounds.size();
             let axis = if size.x >= size.y.max(size.z) {
@@ -79,7 +81,7 @@ impl Boundary {
         } else if items.len() > 1 {
             for item in items {
                 let (skip, length) = (self.nodes.len() as u32 + 1, item.1.length() * (1.0 + 1e-9));
-                self.nodes.push(Node { bounds: item.0, length, sum: length, skip });
+                self.nodes.push(Node { bounds: item.0, size: item.0.diagonal(), length, sum: length, skip });
             }
         }
         self.nodes[index].skip = self.nodes.len() as u32;
@@ -109,7 +111,7 @@ impl Boundary {
             let leaf = node.skip as usize == index + 1;
             let gap = node.bounds.distance_squared(p).sqrt() * (1.0 - 1e-12) - radius;
             // Far for its size: at most a quarter is given away.
-            let size = node.bounds.diagonal();
+            let size = node.size;
             if leaf || gap > 4.0 * size {
                 if gap <= 0.0 {
                     return f64::INFINITY;

@@ -30,6 +30,12 @@ const STEEP: f64 = 0.02;
 /// Groups of triangles a worker takes at once.
 const CHUNK: usize = 256;
 
+/// Groups that follow each other in the tree, and share what is known where the boundary is far.
+const CLUSTER: usize = 8;
+
+/// So many times its radius has to be known around what shares.
+const ROOM: f64 = 4.0;
+
 /// What a triangle parts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Wall {
@@ -85,14 +91,20 @@ pub(crate) fn walls(mesh: &TriangleMesh, topology: &Topology, tree: &Tree, sound
     let groups: Vec<Vec<u32>> = groups.filter(|group| !group.is_empty()).collect();
     let chunk = |block: usize| &groups[block * CHUNK..((block + 1) * CHUNK).min(groups.len())];
     let found = run.blocks("decide sides", groups.len().div_ceil(CHUNK), |block| {
-        let spots = chunk(block).iter().map(|group| {
-            let corners: Vec<DVec3> = group.iter().flat_map(|&t| mesh.corners(t)).collect();
-            let all = Spot::around(&corners, boundary, f64::INFINITY);
-            let each: Vec<Spot> = corners.chunks_exact(3).map(|corners| Spot::around(corners, boundary, all.steepest)).collect();
-            (all, each)
+        let corners = |group: &Vec<u32>| group.iter().flat_map(|&t| mesh.corners(t)).collect::<Vec<DVec3>>();
+        let spots = chunk(block).chunks(CLUSTER).map(|cluster| {
+            let each: Vec<Vec<DVec3>> = cluster.iter().map(corners).collect();
+            let all = Spot::around(&each.concat(), boundary, f64::INFINITY);
+            let groups = each.iter().map(|corners| {
+                let group = Spot::around(corners, boundary, all.steepest);
+                let each = corners.chunks_exact(3).map(|corners| Spot::around(corners, boundary, group.steepest));
+                (group, each.collect::<Vec<Spot>>())
+            });
+            (all, groups.collect::<Vec<_>>())
         });
         Ok(spots.collect::<Vec<_>>())
     })?;
+    let (clusters_at, found): (Vec<Spot>, Vec<_>) = found.into_iter().flatten().unzip();
     let (groups_at, each): (Vec<Spot>, Vec<Vec<Spot>>) = found.into_iter().flatten().unzip();
     let mut spots = vec![Spot { center: DVec3::ZERO, radius: 0.0, steepest: f64::INFINITY }; sound.len()];
     for (group, each) in groups.iter().zip(each) {
@@ -103,15 +115,24 @@ pub(crate) fn walls(mesh: &TriangleMesh, topology: &Topology, tree: &Tree, sound
     let known = hand_on(mesh, topology, &spots, sum, run)?;
     let reached = run.blocks("decide sides", groups.len().div_ceil(CHUNK), |block| {
         let start = block * CHUNK;
-        let each = chunk(block).iter().zip(&groups_at[start..]).map(|(group, at)| {
-            let mut steps = Steps::new(at, boundary);
-            let mut wall = |t: u32| {
-                let (spot, known) = (&spots[t as usize], known[t as usize]?);
-                let wall = steps.wall(spot, known);
-                let near = f64::from(wall.reach) < 4.0 * at.radius;
-                Some(if near { Steps::new(spot, boundary).wall(spot, known) } else { wall })
-            };
-            group.iter().map(|&t| wall(t).unwrap_or(Wall::UNKNOWN)).collect::<Vec<_>>()
+        let clusters = chunk(block).chunks(CLUSTER).zip(&clusters_at[start / CLUSTER..]).zip(groups_at[start..].chunks(CLUSTER));
+        let each = clusters.flat_map(|((cluster, at), groups_at)| {
+            let mut far = Steps::new(at, boundary);
+            let walls = cluster.iter().zip(groups_at).map(|(group, group_at)| {
+                let mut near = None;
+                let mut wall = |t: u32| {
+                    let (spot, known) = (&spots[t as usize], known[t as usize]?);
+                    let wall = far.wall(spot, known);
+                    if f64::from(wall.reach) >= ROOM * at.radius {
+                        return Some(wall);
+                    }
+                    let wall = near.get_or_insert_with(|| Steps::new(group_at, boundary)).wall(spot, known);
+                    let enough = f64::from(wall.reach) >= ROOM * group_at.radius;
+                    Some(if enough { wall } else { Steps::new(spot, boundary).wall(spot, known) })
+                };
+                group.iter().map(|&t| wall(t).unwrap_or(Wall::UNKNOWN)).collect::<Vec<_>>()
+            });
+            walls.collect::<Vec<_>>()
         });
         Ok(each.collect::<Vec<_>>())
     })?;
