@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from truefield.errors import FileError, TruefieldError
 from truefield.files import PathLike
-from truefield.formats.polygons import FormatError, Soup
+from truefield.formats.polygons import FormatError, Soup, size_of
 from truefield.mesh import TriangleMesh
 
 
@@ -31,9 +35,9 @@ def read(path: PathLike) -> TriangleMesh:
     if suffix not in formats.READABLE and (file.is_file() or not file.exists()):
         what = f"the suffix '{file.suffix}' is not known" if suffix else "it has no suffix"
         raise FileError(f"cannot read '{file}': {what}; a mesh is one of {', '.join(formats.READABLE)}")
-    data = _content(file)
     try:
-        soup = formats.decode(data, file)
+        with _opened(file) as stream:
+            soup = formats.decode(stream, file)
         return _mesh(soup, file)
     except FormatError as error:
         raise FileError(f"cannot read '{file}': {error}") from None
@@ -53,15 +57,17 @@ def read_points(path: PathLike) -> NDArray[np.float64]:
     """
     from truefield.formats import ply, points
 
-    decoders = {".csv": points.decode_text, ".xyz": points.decode_text, ".txt": points.decode_text}
-    decoders |= {".npy": points.decode_npy, ".ply": ply.decode_points}
+    decoders: dict[str, Callable[[IO[bytes]], NDArray[np.float64]]] = {
+        **dict.fromkeys((".csv", ".xyz", ".txt"), lambda stream: points.decode_text(stream.read())),
+        **{".npy": lambda stream: points.decode_npy(stream.read()), ".ply": ply.decode_points},
+    }
     file = Path(path)
     suffix = file.suffix.lower()
     if suffix not in decoders and (file.is_file() or not file.exists()):
         raise FileError(f"cannot read points from '{file}': its suffix must be one of {', '.join(decoders)}")
-    data = _content(file)
     try:
-        array = decoders[suffix](data)
+        with _opened(file) as stream:
+            array = decoders[suffix](stream)
     except FormatError as error:
         raise FileError(f"cannot read points from '{file}': {error}") from None
     if len(array) == 0:
@@ -75,21 +81,26 @@ def read_points(path: PathLike) -> NDArray[np.float64]:
     return array
 
 
-def _content(file: Path) -> bytes:
+@contextmanager
+def _opened(file: Path) -> Iterator[IO[bytes]]:
+    """A stream of the file's bytes that can be read twice; faults of reading are one sentence."""
     if file.is_dir():
         raise FileError(f"cannot read '{file}': it is a folder; give the name of a file")
     try:
-        data = file.read_bytes()
+        with file.open("rb") as content:
+            stream: IO[bytes] = content if content.seekable() else BytesIO(content.read())
+            if size_of(stream) == 0:
+                raise FileError(f"cannot read '{file}': the file is empty; export it again")
+            yield stream
     except FileNotFoundError:
         raise FileError(f"cannot read '{file}': there is no such file; check the name") from None
+    except FileError:
+        raise
     except OSError as error:
         raise FileError(f"cannot read '{file}': {(error.strerror or str(error)).lower()}") from None
-    if not data:
-        raise FileError(f"cannot read '{file}': the file is empty; export it again")
-    return data
 
 
 def _mesh(soup: Soup, file: Path) -> TriangleMesh:
     if len(soup.triangles) == 0:
         raise TruefieldError("it has no triangles; export it as a triangle mesh")
-    return TriangleMesh(soup.vertices, soup.triangles, name=file.stem)
+    return TriangleMesh.checked(soup.vertices, soup.triangles, file.stem)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -36,10 +36,19 @@ class TriangleMesh:
 
     def __init__(self, vertices: ArrayLike, triangles: ArrayLike, name: str = "mesh") -> None:
         """Checks and copies the arrays."""
-        self._name = str(name)
-        self._vertices = _frozen(_points(vertices))
-        self._triangles = _frozen(_indices(triangles, len(self._vertices)))
-        self._extent = _extent(self._vertices, self._triangles)
+        points = _points(vertices).copy()
+        self._take(points, np.array(_indices(triangles, len(points)), np.int64, order="C", copy=True), str(name))
+
+    @classmethod
+    def checked(cls, vertices: Array, triangles: NDArray[np.int64], name: str) -> TriangleMesh:
+        """A mesh of arrays that nobody else holds: checked as any other, but kept without a copy."""
+        mesh = cls.__new__(cls)
+        mesh._take(_points(vertices), _indices(triangles, len(vertices)), name)
+        return mesh
+
+    def _take(self, vertices: Array, triangles: NDArray[np.int64], name: str) -> None:
+        self._name, self._vertices, self._triangles = name, _frozen(vertices), _frozen(triangles)
+        self._extent = _extent(vertices, triangles)
 
     @classmethod
     def trusted(
@@ -128,7 +137,7 @@ class TriangleMesh:
 
 def _points(vertices: ArrayLike) -> Array:
     try:
-        points: Array = arguments.real(vertices).copy()
+        points = arguments.real(vertices)
     except (TypeError, ValueError):
         raise TruefieldError("vertices cannot be turned into numbers; give an array of shape (n, 3)") from None
     if points.ndim != 2 or points.shape[1] != 3:
@@ -148,7 +157,7 @@ def _points(vertices: ArrayLike) -> Array:
     return points
 
 
-def _indices(triangles: ArrayLike, count: int) -> NDArray[np.int64]:
+def _indices(triangles: ArrayLike, count: int) -> NDArray[Any]:
     try:
         given = np.asarray(triangles)
     except ValueError as error:
@@ -165,7 +174,7 @@ def _indices(triangles: ArrayLike, count: int) -> NDArray[np.int64]:
             f"triangle {index} refers to vertices {given[index].tolist()} but the mesh has only {count} vertices "
             f"(0 to {count - 1})"
         )
-    return np.array(given, dtype=np.int64, order="C", copy=True)
+    return given
 
 
 def _extent(vertices: Array, triangles: NDArray[np.int64]) -> tuple[Array, Array]:

@@ -7,6 +7,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from truefield._truefield import Distinct
+
 
 def leaders(points: NDArray[np.float64], within: float) -> NDArray[np.int64]:
     """For each point (n, 3) the lowest index of its group: points joined by a chain of steps of at most `within`.
@@ -24,7 +26,10 @@ def leaders(points: NDArray[np.float64], within: float) -> NDArray[np.int64]:
 
 def _equal(points: NDArray[np.float64]) -> NDArray[np.int64]:
     """The lowest index of an equal point; -0 equals 0."""
-    return _first_of_group(np.ascontiguousarray(points + 0.0))[0]
+    group = Distinct().numbers(points)
+    # Groups are numbered as they appear: a number that none before has reached is a group's first.
+    first = np.flatnonzero(np.diff(np.maximum.accumulate(group), prepend=-1))
+    return first[group]
 
 
 def _first_of_group(rows: NDArray[np.generic]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:

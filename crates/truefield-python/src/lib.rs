@@ -13,6 +13,7 @@ mod edit;
 mod field;
 mod implicit;
 mod marching;
+mod mesh;
 mod patch;
 mod products;
 mod render;
@@ -36,6 +37,7 @@ fn _truefield(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<implicit::PyExpression>()?;
     module.add_class::<render::PyCamera>()?;
     module.add_class::<render::PyScene>()?;
+    module.add_class::<mesh::PyDistinct>()?;
     module.add_function(wrap_pyfunction!(check::check_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(thickness::thickness, module)?)?;
     module.add_function(wrap_pyfunction!(thickness::walls_at, module)?)?;

@@ -8,7 +8,7 @@ containers (glTF, 3MF) go through trimesh, and what it returns is counted agains
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from truefield.errors import FileError
 from truefield.files import PathLike
@@ -26,14 +26,14 @@ READABLE = (*_DECODERS, *_CONTAINERS)
 WRITABLE = tuple(_ENCODERS)
 
 
-def decode(data: bytes, path: Path) -> Soup:
-    """Vertices and triangles of the file's content; `path` gives the format and, for `.gltf`, its neighbours."""
+def decode(stream: IO[bytes], path: Path) -> Soup:
+    """Vertices and triangles of a file from its begin; `path` gives the format and, for `.gltf`, its neighbours."""
     suffix = path.suffix.lower()
     if suffix in _CONTAINERS:
         from truefield.formats import scene  # brings archives and XML with it
 
-        return scene.decode(data, path)
-    return _DECODERS[suffix](data)
+        return scene.decode(stream.read(), path)
+    return _DECODERS[suffix](stream)
 
 
 def check(path: PathLike) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from truefield.formats.polygons import FormatError, Soup, fan, numbers
+from truefield.formats.polygons import Column, FormatError, Soup, fan, numbers, pieces
 
 if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
@@ -14,43 +15,56 @@ if TYPE_CHECKING:
 _SURFACES = (b"surf", b"curv", b"curv2", b"cstype")
 
 
-def decode(data: bytes) -> Soup:
+def decode(stream: IO[bytes]) -> Soup:
     """Reads `v` and `f` lines; polygons become fans, negative indices count back, all else is decoration."""
-    if b"\0" in data:
-        raise FormatError("it holds zero bytes, so it is no OBJ, which is text")
-    positions: list[bytes] = []
-    corners: list[int] = []
-    sizes: list[int] = []
-    known = 0
+    vertices, corners, sizes = Column(np.float64), Column(np.int64), Column(np.int64)
+    known = before = 0
     curved = False
-    for number, line in enumerate(data.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines(), start=1):
-        words = line.split()
-        if not words:
-            continue
-        key = words[0]
-        if key == b"v":
-            if len(words) < 4:
-                raise FormatError(f"vertex {known} (line {number}) has {len(words) - 1} coordinates instead of 3")
-            positions += words[1:4]
-            known += 1
-        elif key in (b"f", b"fo"):
-            face = _corners(words[1:], number)
-            if 0 in face:
-                raise FormatError(f"the face in line {number} refers to vertex 0, but OBJ counts from 1")
-            if len(face) < 3:
-                raise FormatError(f"the face in line {number} has {len(face)} corners; a face needs 3 or more")
-            corners += [index - 1 if index > 0 else index + known for index in face]
-            sizes.append(len(face))
-            if min(corners[-len(face) :]) < 0:
-                raise FormatError(f"the face in line {number} counts back before the first vertex")
-        elif key in _SURFACES:
-            curved = True
-    if curved and not sizes:
+    for piece in _pieces(stream):
+        if b"\0" in piece:
+            raise FormatError("it holds zero bytes, so it is no OBJ, which is text")
+        positions: list[bytes] = []
+        faces: list[int] = []
+        counts: list[int] = []
+        lines = piece.splitlines()
+        for number, line in enumerate(lines, start=before + 1):
+            words = line.split()
+            key = words[0] if words else b""
+            if key == b"v":
+                if len(words) < 4:
+                    raise FormatError(f"vertex {known} (line {number}) has {len(words) - 1} coordinates instead of 3")
+                positions += words[1:4]
+                known += 1
+            elif key in (b"f", b"fo"):
+                face = _corners(words[1:], number)
+                if 0 in face:
+                    raise FormatError(f"the face in line {number} refers to vertex 0, but OBJ counts from 1")
+                if len(face) < 3:
+                    raise FormatError(f"the face in line {number} has {len(face)} corners; a face needs 3 or more")
+                faces += [index - 1 if index > 0 else index + known for index in face]
+                counts.append(len(face))
+                if min(faces[-len(face) :]) < 0:
+                    raise FormatError(f"the face in line {number} counts back before the first vertex")
+            elif key in _SURFACES:
+                curved = True
+        before += len(lines)
+        vertices.add(numbers(positions, "a vertex"))
+        corners.add(np.array(faces, dtype=np.int64))
+        sizes.add(np.array(counts, dtype=np.int64))
+    if curved and not len(sizes):
         raise FormatError("it holds curved surfaces but no faces; export it as triangles")
-    if not known and not sizes:
+    if not known and not len(sizes):
         raise FormatError("it holds no 'v' and no 'f' lines, so it is no OBJ or an empty one")
-    vertices = numbers(positions, "a vertex").reshape(-1, 3)
-    return Soup(vertices, fan(np.array(corners, dtype=np.int64), np.array(sizes, dtype=np.int64)))
+    return Soup(vertices.array().reshape(-1, 3), fan(corners.array(), sizes.array()))
+
+
+def _pieces(stream: IO[bytes]) -> Iterator[bytes]:
+    """Whole lines, those put together that a backslash continues."""
+    for piece in pieces(stream):
+        whole = piece
+        while whole.endswith((b"\\\n", b"\\\r\n")) and (line := stream.readline()):
+            whole += line
+        yield whole.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
 
 
 def _corners(words: list[bytes], number: int) -> list[int]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from io import BytesIO
 from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from truefield.formats.polygons import FormatError, Soup, fan, numbers
+from truefield.formats.polygons import Column, FormatError, Soup, fan, numbers, pieces
 
 if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
@@ -32,6 +32,7 @@ _NAMES: Final = {
 }
 _ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _ROWS: Final = 65_536
+_START: Final = 1 << 16  # bytes in which headers and rows nearly always end
 _CORNERS: Final = ("vertex_indices", "vertex_index")
 
 
@@ -57,9 +58,9 @@ class _Lists(NamedTuple):
 _Table = dict[str, NDArray[np.float64] | _Lists]
 
 
-def decode(data: bytes) -> Soup:
+def decode(stream: IO[bytes]) -> Soup:
     """Reads positions and polygons; polygons become fans, colours, normals and the rest are passed over."""
-    tables = _tables(data)
+    tables = _tables(stream)
     faces = tables.get("face", {})
     lists = next((column for name in _CORNERS if isinstance(column := faces.get(name), _Lists)), None)
     if lists is None:
@@ -69,12 +70,12 @@ def decode(data: bytes) -> Soup:
     if (lists.sizes < 3).any():
         index = int(np.argmax(lists.sizes < 3))
         raise FormatError(f"face {index} has {lists.sizes[index]} corners; a face needs 3 or more")
-    return Soup(_positions(tables), fan(_indices(lists.items), lists.sizes))
+    return Soup(_positions(tables), fan(lists.items, lists.sizes))
 
 
-def decode_points(data: bytes) -> NDArray[np.float64]:
+def decode_points(stream: IO[bytes]) -> NDArray[np.float64]:
     """The positions (n, 3) of the element `vertex`."""
-    return _positions(_tables(data))
+    return _positions(_tables(stream))
 
 
 def _positions(tables: dict[str, _Table]) -> NDArray[np.float64]:
@@ -85,19 +86,19 @@ def _positions(tables: dict[str, _Table]) -> NDArray[np.float64]:
     return np.stack(arrays, axis=1)
 
 
-def _tables(data: bytes) -> dict[str, _Table]:
-    order, elements, body = _header(data)
+def _tables(stream: IO[bytes]) -> dict[str, _Table]:
+    """What is wanted of each element: positions and corners."""
+    order, elements = _header(stream)
     tables: dict[str, _Table] = {}
-    at = 0
     if order is None:
-        tokens = body.split()
+        tokens = _Tokens(stream)
         for element in elements:
-            tables[element.name], at = _text_table(element, tokens, at)
-        rest = len(tokens) - at
+            tables[element.name] = _table(element, _text_parts(element, tokens))
+        rest = tokens.left()
     else:
         for element in elements:
-            tables[element.name], at = _binary_table(element, body, at, order)
-        rest = len(body[at:].strip())
+            tables[element.name] = _table(element, _binary_parts(element, stream, order))
+        rest = len(stream.read().strip())
     if rest:
         raise FormatError(
             f"it goes on after the last element it declares ({rest} {'bytes' if order else 'numbers'} more)"
@@ -105,10 +106,37 @@ def _tables(data: bytes) -> dict[str, _Table]:
     return tables
 
 
-def _header(data: bytes) -> tuple[str | None, list[_Element], bytes]:
+class _Tokens:
+    """The words of a text, some at a time."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._pieces = pieces(stream)
+        self._words: list[bytes] = []
+        self._at = 0
+
+    def take(self, count: int) -> list[bytes]:
+        """The next words: fewer where the text ends."""
+        if self._at + count > len(self._words):
+            self._words = self._words[self._at :]
+            self._at = 0
+            while len(self._words) < count and (piece := next(self._pieces, None)) is not None:
+                self._words += piece.split()
+        taken = self._words[self._at : self._at + count]
+        self._at += len(taken)
+        return taken
+
+    def left(self) -> int:
+        """How many words there are still."""
+        return len(self._words) - self._at + sum(len(piece.split()) for piece in self._pieces)
+
+
+def _header(stream: IO[bytes]) -> tuple[str | None, list[_Element]]:
+    """The order of bytes, `None` for text, and the elements; leaves the stream where the body begins."""
+    start, data = stream.tell(), stream.read(_START)
     if not data.startswith((b"ply\n", b"ply\r")):
         raise FormatError("it does not begin with 'ply', so it is no PLY")
-    end = data.find(b"end_header")
+    while (end := data.find(b"end_header")) < 0 and (more := stream.read(_START)):
+        data += more
     if end < 0:
         raise FormatError("its header has no 'end_header'; the file is truncated or no PLY")
     # The body begins after one line break; a lone carriage return is one only where the header uses it too.
@@ -134,42 +162,69 @@ def _header(data: bytes) -> tuple[str | None, list[_Element], bytes]:
         raise FormatError("its header has no 'format' line")
     if any(element.rows < 0 for element in elements):
         raise FormatError("its header declares a negative count")
-    return order, elements, data[after:]
+    stream.seek(start + after)
+    return order, elements
 
 
-def _text_table(element: _Element, tokens: list[bytes], at: int) -> tuple[_Table, int]:
-    lists = [column for column in element.properties if column.count_kind]
+def _table(element: _Element, parts: Iterator[_Table]) -> _Table:
+    """The columns that are looked at, of all rows; the others are only read."""
+    wanted = {"vertex": ("x", "y", "z"), "face": _CORNERS}.get(element.name, ())
+    columns = [column for column in element.properties if column.name in wanted]
+    values = {column.name: Column(np.float64) for column in columns if not column.count_kind}
+    sizes = {column.name: Column(np.int64) for column in columns if column.count_kind}
+    items = {name: Column(np.int64) for name in sizes}
+    for part in parts:
+        for name, column in part.items():
+            if not isinstance(column, _Lists):
+                if name in values:
+                    values[name].add(column)
+            elif name in sizes:
+                sizes[name].add(column.sizes)
+                items[name].add(_indices(column.items))
+    scalars: _Table = {name: column.array() for name, column in values.items()}
+    return scalars | {name: _Lists(sizes[name].array(), items[name].array()) for name in sizes}
+
+
+def _text_parts(element: _Element, tokens: _Tokens) -> Iterator[_Table]:
+    lists = any(column.count_kind for column in element.properties)
     width = len(element.properties)
-    if not lists:
-        end = at + element.rows * width
-        _enough(element, len(tokens) >= end)
-        grid = numbers(tokens[at:end], f"element '{element.name}'").reshape(element.rows, width)
-        return {column.name: grid[:, i] for i, column in enumerate(element.properties)}, end
-    scalars: dict[str, list[bytes]] = {column.name: [] for column in element.properties}
-    sizes: dict[str, list[int]] = {column.name: [] for column in lists}
-    for _ in range(element.rows):
+    for first in range(0, element.rows, _ROWS):
+        rows = min(_ROWS, element.rows - first)
+        if lists:
+            yield _text_lists(element, rows, tokens)
+            continue
+        words = tokens.take(rows * width)
+        _enough(element, len(words) == rows * width)
+        grid = numbers(words, f"element '{element.name}'").reshape(rows, width)
+        yield {column.name: grid[:, i] for i, column in enumerate(element.properties)}
+
+
+def _text_lists(element: _Element, rows: int, tokens: _Tokens) -> _Table:
+    words: dict[str, list[bytes]] = {column.name: [] for column in element.properties}
+    sizes: dict[str, list[int]] = {column.name: [] for column in element.properties if column.count_kind}
+    for _ in range(rows):
         for column in element.properties:
-            _enough(element, at < len(tokens))
             size = 1
             if column.count_kind:
-                size = _size(element, tokens[at])
+                length = tokens.take(1)
+                _enough(element, len(length) == 1)
+                size = _size(element, length[0])
                 sizes[column.name].append(size)
-                at += 1
-            _enough(element, at + size <= len(tokens))
-            scalars[column.name] += tokens[at : at + size]
-            at += size
+            taken = tokens.take(size)
+            _enough(element, len(taken) == size)
+            words[column.name] += taken
     table: _Table = {}
     for column in element.properties:
-        values = numbers(scalars[column.name], f"'{column.name}' of element '{element.name}'")
+        values = numbers(words[column.name], f"'{column.name}' of element '{element.name}'")
         table[column.name] = _lists(sizes[column.name], values) if column.count_kind else values
-    return table, at
+    return table
 
 
-def _binary_table(element: _Element, body: bytes, at: int, order: str) -> tuple[_Table, int]:
+def _binary_parts(element: _Element, stream: IO[bytes], order: str) -> Iterator[_Table]:
     if element.rows == 0:
-        return {}, at
+        return
     # Nearly always all lists of a column are as long as the first: then a row is a fixed record.
-    lengths = _row_lengths(element, body, at, order)
+    lengths = _first_lengths(element, stream, order)
     record = np.dtype(
         [
             field
@@ -181,22 +236,38 @@ def _binary_table(element: _Element, body: bytes, at: int, order: str) -> tuple[
             )
         ]
     )
-    end = at + element.rows * record.itemsize
-    if len(body) >= end:
-        rows = np.frombuffer(body, dtype=record, count=element.rows, offset=at)
-        if all(
-            (rows[f"count{i}"] == lengths[i]).all() for i, column in enumerate(element.properties) if column.count_kind
-        ):
-            table: _Table = {}
-            for i, column in enumerate(element.properties):
-                values = rows[f"value{i}"]
-                if column.count_kind:
-                    table[column.name] = _lists([lengths[i]] * element.rows, values.reshape(-1))
-                else:
-                    table[column.name] = values.astype(np.float64)
-            return table, end
-    _enough(element, any(column.count_kind for column in element.properties))
-    return _walk(element, body, at, order)
+    lists = [i for i, column in enumerate(element.properties) if column.count_kind]
+    for first in range(0, element.rows, _ROWS):
+        count = min(_ROWS, element.rows - first)
+        at = stream.tell()
+        data = stream.read(count * record.itemsize)
+        whole = len(data) == count * record.itemsize
+        _enough(element, whole or bool(lists))
+        rows = np.frombuffer(data, dtype=record) if whole else None
+        if rows is None or not all((rows[f"count{i}"] == lengths[i]).all() for i in lists):
+            stream.seek(at)
+            yield from _walk(element._replace(rows=element.rows - first), stream, order)
+            return
+        table: _Table = {}
+        for i, column in enumerate(element.properties):
+            values = rows[f"value{i}"]
+            if column.count_kind:
+                table[column.name] = _Lists(np.full(count, lengths[i]), values.reshape(-1))
+            else:
+                table[column.name] = values.astype(np.float64)
+        yield table
+
+
+def _first_lengths(element: _Element, stream: IO[bytes], order: str) -> list[int]:
+    """The lengths of the first row's columns; the stream stays where it is."""
+    at = stream.tell()
+    start = stream.read(_START)
+    try:
+        return _row_lengths(element, start, 0, order)
+    except FormatError:
+        return _row_lengths(element, start + stream.read(), 0, order)
+    finally:
+        stream.seek(at)
 
 
 def _row_lengths(element: _Element, body: bytes, at: int, order: str) -> list[int]:
@@ -214,21 +285,26 @@ def _row_lengths(element: _Element, body: bytes, at: int, order: str) -> list[in
     return lengths
 
 
-def _walk(element: _Element, body: bytes, at: int, order: str) -> tuple[_Table, int]:
-    parts: dict[str, list[bytes]] = {column.name: [] for column in element.properties}
-    sizes: dict[str, list[int]] = {column.name: [] for column in element.properties}
-    for _ in range(element.rows):
-        for column, length in zip(element.properties, _row_lengths(element, body, at, order), strict=True):
-            at += int(column.count_kind[1]) if column.count_kind else 0
-            end = at + length * int(column.kind[1])
-            parts[column.name].append(body[at:end])
-            sizes[column.name].append(length)
-            at = end
-    table: _Table = {}
-    for column in element.properties:
-        values = np.frombuffer(b"".join(parts[column.name]), dtype=order + column.kind)
-        table[column.name] = _lists(sizes[column.name], values) if column.count_kind else values.astype(np.float64)
-    return table, at
+def _walk(element: _Element, stream: IO[bytes], order: str) -> Iterator[_Table]:
+    """Rows of any length, one after another; leaves the stream behind the last."""
+    start, at = stream.tell(), 0
+    body = stream.read()
+    for first in range(0, element.rows, _ROWS):
+        parts: dict[str, list[bytes]] = {column.name: [] for column in element.properties}
+        sizes: dict[str, list[int]] = {column.name: [] for column in element.properties}
+        for _ in range(min(_ROWS, element.rows - first)):
+            for column, length in zip(element.properties, _row_lengths(element, body, at, order), strict=True):
+                at += int(column.count_kind[1]) if column.count_kind else 0
+                end = at + length * int(column.kind[1])
+                parts[column.name].append(body[at:end])
+                sizes[column.name].append(length)
+                at = end
+        table: _Table = {}
+        for column in element.properties:
+            values = np.frombuffer(b"".join(parts[column.name]), dtype=order + column.kind)
+            table[column.name] = _lists(sizes[column.name], values) if column.count_kind else values.astype(np.float64)
+        yield table
+    stream.seek(start + at)
 
 
 def _lists(sizes: list[int], values: NDArray[Any]) -> _Lists:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from textwrap import shorten
-from typing import NamedTuple
+from typing import IO, Final, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truefield._truefield import Distinct
+
+_PIECE: Final = 1 << 20
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 class FormatError(ValueError):
@@ -19,6 +24,41 @@ class Soup(NamedTuple):
 
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int64]
+
+
+class Column(Generic[_Number]):
+    """Numbers that come piece by piece; the array of all takes them over without a copy."""
+
+    def __init__(self, kind: type[_Number]) -> None:
+        """None yet."""
+        self._kind: np.dtype[_Number] = np.dtype(kind)
+        self._bytes = bytearray()
+
+    def add(self, numbers: NDArray[_Number]) -> None:
+        """More of them, in order."""
+        self._bytes += np.ascontiguousarray(numbers).data.cast("B") if numbers.size else b""
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._bytes) // int(self._kind.itemsize)
+
+    def array(self) -> NDArray[_Number]:
+        """All of them, (n,); nothing can be added then."""
+        return np.frombuffer(self._bytes, dtype=self._kind)
+
+
+def pieces(stream: IO[bytes]) -> Iterator[bytes]:
+    """What is left of a text, in pieces of whole lines, about a megabyte each."""
+    while lines := stream.readlines(_PIECE):
+        yield b"".join(lines)
+
+
+def size_of(stream: IO[bytes]) -> int:
+    """The length of a file, which stays where it is."""
+    at = stream.tell()
+    end = stream.seek(0, 2)
+    stream.seek(at)
+    return end
 
 
 def fan(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -44,13 +84,9 @@ def merge_equal(soup: Soup) -> Soup:
 
     Only for formats that cannot share a vertex: without it no edge of theirs would have two triangles.
     """
-    from truefield.weld import leaders
-
-    if len(soup.vertices) == 0 or not np.isfinite(soup.vertices).all():
-        return soup  # the mesh's own check names the vertex
-    leader = leaders(soup.vertices, 0.0)
-    kept = np.flatnonzero(leader == np.arange(len(leader)))
-    return Soup(soup.vertices[kept] + 0.0, np.searchsorted(kept, leader)[soup.triangles])
+    distinct = Distinct()
+    numbers = distinct.numbers(soup.vertices)
+    return Soup(distinct.take(), numbers[soup.triangles])
 
 
 def reason(error: Exception) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import IO, TYPE_CHECKING, Final
 
 import numpy as np
 
-from truefield.formats.polygons import FormatError, Soup, merge_equal, numbers
+from truefield._truefield import Distinct
+from truefield.formats.polygons import Column, FormatError, Soup, numbers, pieces, size_of
 
 if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
@@ -18,52 +19,82 @@ _MOST_MOVED: Final = 1e-3
 _FACET: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def decode(data: bytes) -> Soup:
+def decode(stream: IO[bytes]) -> Soup:
     """Reads either kind; which one is told by the size, since binary files may begin with `solid` too."""
-    count = int.from_bytes(data[80:_HEADER], "little") if len(data) >= _HEADER else -1
-    if count >= 0 and len(data) == _HEADER + count * _FACET.itemsize:
-        corners = np.frombuffer(data, dtype=_FACET, offset=_HEADER)["corners"].astype(np.float64)
-    elif data.lstrip()[:5].lower() == b"solid" and b"\0" not in data:
-        corners = _decode_text(data)
-    elif count < 0:
-        raise FormatError(f"it is {len(data)} bytes long, too short for a binary STL, and does not begin with 'solid'")
-    else:
-        needed = _HEADER + count * _FACET.itemsize
-        state = "is truncated" if len(data) < needed else "is no STL or holds more than it says"
-        raise FormatError(
-            f"it {state}: a binary STL of the {count} triangles it declares has {needed} bytes, this file {len(data)}"
-        )
-    vertices = corners.reshape(-1, 3)
-    return merge_equal(Soup(vertices, np.arange(len(vertices), dtype=np.int64).reshape(-1, 3)))
+    size, head = size_of(stream), stream.read(_HEADER)
+    count = int.from_bytes(head[80:], "little") if len(head) == _HEADER else -1
+    needed = _HEADER + count * _FACET.itemsize
+    if count >= 0 and size == needed:
+        return _decode_binary(stream, count)
+    stream.seek(0)
+    if _is_text(stream):
+        stream.seek(0)
+        return _decode_text(stream)
+    if count < 0:
+        raise FormatError(f"it is {size} bytes long, too short for a binary STL, and does not begin with 'solid'")
+    state = "is truncated" if size < needed else "is no STL or holds more than it says"
+    raise FormatError(
+        f"it {state}: a binary STL of the {count} triangles it declares has {needed} bytes, this file {size}"
+    )
 
 
-def _decode_text(data: bytes) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    if b"endsolid" not in data.lower():
+def _decode_binary(stream: IO[bytes], count: int) -> Soup:
+    distinct = Distinct()
+    triangles = np.empty((count, 3), dtype=np.int64)
+    for start in range(0, count, _CHUNK):
+        part = triangles[start : start + _CHUNK]
+        data = stream.read(len(part) * _FACET.itemsize)
+        if len(data) < len(part) * _FACET.itemsize:
+            raise FormatError("it became shorter while it was read")
+        corners = np.frombuffer(data, dtype=_FACET)["corners"].reshape(-1, 3)
+        part[:] = distinct.numbers(corners.astype(np.float64)).reshape(-1, 3)
+    return Soup(distinct.take(), triangles)
+
+
+def _is_text(stream: IO[bytes]) -> bool:
+    """Whether it is a text that begins with `solid`; one that has no end is refused."""
+    begins = ends = False
+    for piece in pieces(stream):
+        begins = begins or piece.lstrip()[:5].lower() == b"solid"
+        if b"\0" in piece or (not begins and piece.strip()):
+            return False
+        ends = ends or b"endsolid" in piece.lower()
+    if begins and not ends:
         raise FormatError("it is truncated: it has no 'endsolid'")
-    tokens: list[bytes] = []
-    facets = solids = 0
-    for number, line in enumerate(data.splitlines(), start=1):
-        words = line.split()
-        key = words[0].lower() if words else b""
-        if key == b"vertex":
-            if len(words) != 4:
-                raise FormatError(f"line {number} has {len(words) - 1} coordinates where a vertex has 3")
-            tokens += words[1:]
-        elif key == b"endfacet":
-            facets += 1
-            if len(tokens) != 9 * facets:
-                raise FormatError(f"the facet that ends in line {number} does not have exactly 3 vertices")
-        elif key == b"solid":
-            solids += 1
-        elif key == b"endsolid":
-            solids -= 1
-        elif key not in (b"", b"facet", b"outer", b"endloop"):
-            raise FormatError(
-                f"line {number} begins with {key.decode(errors='replace')!r}, which is no word of a text STL"
-            )
-    if solids > 0 or len(tokens) != 9 * facets:
+    return begins
+
+
+def _decode_text(stream: IO[bytes]) -> Soup:
+    distinct, corners = Distinct(), Column(np.int64)
+    facets = solids = vertices = before = 0
+    for piece in pieces(stream):
+        tokens: list[bytes] = []
+        lines = piece.splitlines()
+        for number, line in enumerate(lines, start=before + 1):
+            words = line.split()
+            key = words[0].lower() if words else b""
+            if key == b"vertex":
+                if len(words) != 4:
+                    raise FormatError(f"line {number} has {len(words) - 1} coordinates where a vertex has 3")
+                tokens += words[1:]
+                vertices += 1
+            elif key == b"endfacet":
+                facets += 1
+                if vertices != 3 * facets:
+                    raise FormatError(f"the facet that ends in line {number} does not have exactly 3 vertices")
+            elif key == b"solid":
+                solids += 1
+            elif key == b"endsolid":
+                solids -= 1
+            elif key not in (b"", b"facet", b"outer", b"endloop"):
+                raise FormatError(
+                    f"line {number} begins with {key.decode(errors='replace')!r}, which is no word of a text STL"
+                )
+        before += len(lines)
+        corners.add(distinct.numbers(numbers(tokens, "a vertex").reshape(-1, 3)))
+    if solids > 0 or vertices != 3 * facets:
         raise FormatError("it is truncated: the last 'endfacet' or 'endsolid' is missing")
-    return numbers(tokens, "a vertex")
+    return Soup(distinct.take(), corners.array().reshape(-1, 3))
 
 
 def encode(mesh: TriangleMesh) -> bytes:

@@ -1,6 +1,10 @@
 //! Triangle meshes as plain data.
 
+mod positions;
 pub(crate) mod topology;
+
+pub use positions::Distinct;
+pub(crate) use positions::Positions;
 
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3, Facet};

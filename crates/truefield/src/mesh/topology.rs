@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::geom::DVec3;
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Positions, TriangleMesh};
 
 /// One side of a triangle, from corner `side` to the next.
 #[derive(Clone, Copy, Debug)]
@@ -150,17 +150,9 @@ pub(crate) fn collapsed(triangle: &[u32; 3]) -> bool {
 
 /// For every vertex the lowest index at the same position.
 fn weld(vertices: &[DVec3]) -> Vec<u32> {
-    // Adding zero turns -0 into 0.
-    let key = |v: u32| (vertices[v as usize] + DVec3::ZERO).to_array().map(f64::to_bits);
-    let mut order: Vec<u32> = (0..vertices.len() as u32).collect();
-    order.sort_unstable_by_key(|&v| (key(v), v));
-    let mut weld = vec![0; vertices.len()];
-    for same in order.chunk_by(|&a, &b| key(a) == key(b)) {
-        for &v in same {
-            weld[v as usize] = same[0];
-        }
-    }
-    weld
+    let mut positions = Positions::default();
+    let number = |(v, &p): (usize, &DVec3)| positions.number(p, v as u32, |u| vertices[u as usize]);
+    vertices.iter().enumerate().map(number).collect()
 }
 
 /// Disjoint sets with path halving; the lowest member names the set.
