@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
 import zipfile
 from collections.abc import Callable
@@ -99,6 +100,71 @@ def test_an_stl_that_single_precision_would_spoil_is_refused(tmp_path: Path, sca
     assert not list(tmp_path.iterdir())
     mesh.write(tmp_path / "a.ply")
     np.testing.assert_array_equal(tf.read(tmp_path / "a.ply").vertices, mesh.vertices)
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".off"])
+def test_files_are_read_and_written_piece_by_piece(tmp_path: Path, suffix: str) -> None:
+    import tracemalloc
+
+    count = 160
+    turns = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    u, v = (angle.reshape(-1) for angle in np.meshgrid(turns, turns, indexing="ij"))
+    vertices = np.stack(((2 + np.cos(v)) * np.cos(u), (2 + np.cos(v)) * np.sin(u), np.sin(v)), axis=1)
+    corner = np.arange(count * count).reshape(count, count)
+    right, above = np.roll(corner, -1, axis=0), np.roll(corner, -1, axis=1)
+    over = np.roll(right, -1, axis=1)
+    halves = [np.stack(half, axis=-1).reshape(-1, 3) for half in ((corner, right, over), (corner, over, above))]
+    torus = tf.TriangleMesh(vertices, np.concatenate(halves))
+    path = tmp_path / f"torus{suffix}"
+    result = torus.vertices.nbytes + torus.triangles.nbytes
+    # The words of a piece of text, whatever the length of the file.
+    piece = 6 << 20
+    tracemalloc.start()
+    try:
+        torus.write(path)
+        assert tracemalloc.get_traced_memory()[1] < piece
+        tracemalloc.reset_peak()
+        read = tf.read(path)
+        assert tracemalloc.get_traced_memory()[1] < 2 * result + piece
+    finally:
+        tracemalloc.stop()
+    assert len(read.triangles) == len(torus.triangles)
+    if suffix != ".stl":
+        assert np.array_equal(read.vertices, torus.vertices)
+        assert np.array_equal(read.triangles, torus.triangles)
+
+
+def test_pieces_end_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from truefield.formats import ply, polygons
+
+    continued = "v 0 0 0\nv 1 \\\n 0 0\nv 0 \\\r\n1 0\n# end \\\nof it\nf 1 \\\n2 3\n"
+    contents: dict[str, str | bytes] = {
+        "part.stl": stl_text(cube()), "part.obj": continued, "part.ply": ply_text(), "mixed.ply": ply_binary("<"),
+        "part.off": "OFF # of\n\n# nothing\n3 1 0\n0 0 0\n1 0 0\n\n0 1 0\n3 0 1 2\n",
+    }  # fmt: skip
+    whole = {name: tf.read(wrote(tmp_path / name, content)) for name, content in contents.items()}
+    monkeypatch.setattr(polygons, "_PIECE", 1)
+    monkeypatch.setattr(ply, "_START", 16)
+    for rows in (1, 3):
+        monkeypatch.setattr(ply, "_ROWS", rows)
+        for name, mesh in whole.items():
+            parts = tf.read(tmp_path / name)
+            assert np.array_equal(parts.vertices, mesh.vertices)
+            assert np.array_equal(parts.triangles, mesh.triangles)
+    assert whole["part.obj"].triangles.tolist() == [[0, 1, 2]]
+
+
+def test_a_pipe_is_read_like_a_file(tmp_path: Path) -> None:
+    import threading
+
+    pipe = tmp_path / "part.stl"
+    os.mkfifo(pipe)
+    cube().write(tmp_path / "cube.stl")
+    data = (tmp_path / "cube.stl").read_bytes()
+    writer = threading.Thread(target=lambda: pipe.write_bytes(data))
+    writer.start()
+    assert len(tf.read(pipe).triangles) == 12
+    writer.join()
 
 
 def test_text_stl_is_read_in_full_precision(tmp_path: Path) -> None:

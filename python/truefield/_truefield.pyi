@@ -14,6 +14,7 @@ __all__ = [
     "AdaptiveField",
     "Camera",
     "CompleteField",
+    "Distinct",
     "Expression",
     "SampledField",
     "Scene",
@@ -118,6 +119,7 @@ def site_indices(
     progress: _Progress = None,
 ) -> None: ...
 
+@final
 class Distinct:
     def __new__(cls) -> Distinct: ...
     def numbers(self, points: _Floats) -> NDArray[np.int64]: ...

@@ -120,11 +120,11 @@ class TriangleMesh:
         Raises:
             FileError: the suffix is unknown or the file cannot be written.
         """
-        from truefield.formats import encode
+        from truefield import formats
 
-        data = encode(self, path)
+        formats.check(path)
         with replacing(path) as stream:
-            stream.write(data)
+            formats.encode(self, path, stream)
 
     def __repr__(self) -> str:
         """Name and counts."""

@@ -442,7 +442,8 @@ class ThicknessReport:
             counted = np.isfinite(around)
             mean = np.where(counted, around, 0.0).sum(axis=1) / np.maximum(counted.sum(axis=1), 1)
             known = np.where(np.isfinite(known), known, np.where(counted.any(axis=1), mean, np.nan))
-        path.write_bytes(ply.encode(mesh, {"thickness": np.nan_to_num(scalars)}))
+        with path.open("wb") as stream:
+            ply.encode(mesh, stream, {"thickness": np.nan_to_num(scalars)})
 
     def _draw(self, folder: Path, threads: int | None) -> None:
         from truefield import pictures

@@ -42,10 +42,9 @@ def check(path: PathLike) -> None:
         raise FileError(f"cannot write a mesh to '{path}': its suffix must be one of {', '.join(WRITABLE)}")
 
 
-def encode(mesh: TriangleMesh, path: PathLike) -> bytes:
-    """The content of a mesh file of the format that the suffix of `path` names."""
-    check(path)
+def encode(mesh: TriangleMesh, path: PathLike, stream: IO[bytes]) -> None:
+    """Writes the content of a mesh file, piece by piece, in the format that the suffix of `path` names."""
     try:
-        return _ENCODERS[Path(path).suffix.lower()](mesh)
+        _ENCODERS[Path(path).suffix.lower()](mesh, stream)
     except FormatError as error:
         raise FileError(f"cannot write '{path}': {error}; write .ply, .obj or .off") from None

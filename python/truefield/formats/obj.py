@@ -7,7 +7,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from truefield.formats.polygons import Column, FormatError, Soup, fan, numbers, pieces
+from truefield.formats.polygons import Column, FormatError, Soup, fan, numbers, pieces, write_rows
 
 if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
@@ -77,8 +77,7 @@ def _corners(words: list[bytes], number: int) -> list[int]:
     return face
 
 
-def encode(mesh: TriangleMesh) -> bytes:
+def encode(mesh: TriangleMesh, stream: IO[bytes]) -> None:
     """OBJ with shortest decimals that read back as the same float64."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (mesh.triangles + 1).tolist()]
-    return ("\n".join(lines) + "\n").encode("ascii")
+    write_rows(stream, "v {!r} {!r} {!r}\n", mesh.vertices)
+    write_rows(stream, "f {} {} {}\n", mesh.triangles, added=1)

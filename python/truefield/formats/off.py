@@ -9,7 +9,7 @@ from typing import IO, TYPE_CHECKING, Final
 
 import numpy as np
 
-from truefield.formats.polygons import Column, FormatError, Soup, fan, integers, numbers, pieces
+from truefield.formats.polygons import Column, FormatError, Soup, fan, integers, numbers, pieces, write_rows
 
 if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
@@ -86,9 +86,8 @@ def _add_faces(corners: Column[np.int64], sizes: Column[np.int64], rows: list[li
     sizes.add(counts)
 
 
-def encode(mesh: TriangleMesh) -> bytes:
+def encode(mesh: TriangleMesh, stream: IO[bytes]) -> None:
     """OFF with shortest decimals that read back as the same float64."""
-    lines = ["OFF", f"{len(mesh.vertices)} {len(mesh.triangles)} 0"]
-    lines += [f"{x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
-    lines += [f"3 {a} {b} {c}" for a, b, c in mesh.triangles.tolist()]
-    return ("\n".join(lines) + "\n").encode("ascii")
+    stream.write(f"OFF\n{len(mesh.vertices)} {len(mesh.triangles)} 0\n".encode("ascii"))
+    write_rows(stream, "{!r} {!r} {!r}\n", mesh.vertices)
+    write_rows(stream, "3 {} {} {}\n", mesh.triangles)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from io import BytesIO
 from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -331,20 +330,15 @@ def _enough(element: _Element, enough: bool) -> None:
         raise FormatError(f"it is truncated: it ends within the {element.rows} elements '{element.name}' it declares")
 
 
-def encode(mesh: TriangleMesh, scalars: Mapping[str, NDArray[np.generic]] | None = None) -> bytes:
+def encode(mesh: TriangleMesh, stream: IO[bytes], scalars: Mapping[str, NDArray[np.generic]] | None = None) -> None:
     """Binary little endian, double vertices with `scalars`, uchar-counted faces with unsigned indices."""
-    faces = np.empty(len(mesh.triangles), dtype=[("count", "u1"), ("corners", "<u4", 3)])
-    faces["count"] = 3
-    faces["corners"] = mesh.triangles
-    header = f"element face {len(faces)}\nproperty list uchar uint vertex_indices\n"
-    return encode_points(dict(zip("xyz", mesh.vertices.T, strict=True)) | dict(scalars or {}), header) + faces.tobytes()
-
-
-def encode_points(columns: Mapping[str, NDArray[np.generic]], further: str = "") -> bytes:
-    """What `write_points` writes; `further` ends the header."""
-    stream = BytesIO()
-    _write(stream, columns, further)
-    return stream.getvalue()
+    header = f"element face {len(mesh.triangles)}\nproperty list uchar uint vertex_indices\n"
+    _write(stream, dict(zip("xyz", mesh.vertices.T, strict=True)) | dict(scalars or {}), header)
+    for first in range(0, len(mesh.triangles), _ROWS):
+        part = mesh.triangles[first : first + _ROWS]
+        faces = np.empty(len(part), dtype=[("count", "u1"), ("corners", "<u4", 3)])
+        faces["count"], faces["corners"] = 3, part
+        stream.write(faces.data)
 
 
 def write_points(stream: IO[bytes], columns: Mapping[str, NDArray[np.generic]]) -> None:
@@ -366,7 +360,7 @@ def _write(stream: IO[bytes], columns: Mapping[str, NDArray[np.generic]], furthe
         rows = np.empty(min(_ROWS, count - first), dtype=row)
         for name, column in columns.items():
             rows[name] = column[first : first + _ROWS]
-        stream.write(rows.tobytes())
+        stream.write(rows.data)
 
 
 def _kind(name: str, column: NDArray[np.generic]) -> str:

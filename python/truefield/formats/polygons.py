@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from truefield._truefield import Distinct
 
-_PIECE: Final = 1 << 20
+_PIECE: Final = 1 << 18
+_ROWS: Final = 1 << 14
 _Number = TypeVar("_Number", np.float64, np.int64)
 
 
@@ -48,9 +49,16 @@ class Column(Generic[_Number]):
 
 
 def pieces(stream: IO[bytes]) -> Iterator[bytes]:
-    """What is left of a text, in pieces of whole lines, about a megabyte each."""
+    """What is left of a text, in pieces of whole lines, about 256 kB each."""
     while lines := stream.readlines(_PIECE):
         yield b"".join(lines)
+
+
+def write_rows(stream: IO[bytes], line: str, rows: NDArray[_Number], added: int = 0) -> None:
+    """Each row (n, k) as a line, after something is added to it; some rows at a time."""
+    for start in range(0, len(rows), _ROWS):
+        part = rows[start : start + _ROWS] + added
+        stream.write("".join(line.format(*row) for row in part.tolist()).encode("ascii"))
 
 
 def size_of(stream: IO[bytes]) -> int:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
 
 _HEADER: Final = 84
-_CHUNK: Final = 1 << 16
+_CHUNK: Final = 1 << 14
 # Of the longest side: rounding that can be seen.
 _MOST_MOVED: Final = 1e-3
 _FACET: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -97,24 +97,29 @@ def _decode_text(stream: IO[bytes]) -> Soup:
     return Soup(distinct.take(), corners.array().reshape(-1, 3))
 
 
-def encode(mesh: TriangleMesh) -> bytes:
+def encode(mesh: TriangleMesh, stream: IO[bytes]) -> None:
     """Binary STL; coordinates are rounded to float32. Refuses meshes that rounding would spoil."""
-    facets = np.zeros(len(mesh.triangles), dtype=_FACET)
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[mesh.triangles] = True
     moved = 0.0
-    for start in range(0, len(facets), _CHUNK):
-        part = facets[start : start + _CHUNK]
-        corners = mesh.vertices[mesh.triangles[start : start + _CHUNK]]
+    for start in range(0, len(used), _CHUNK):
+        part = mesh.vertices[start : start + _CHUNK][used[start : start + _CHUNK]]
         # What single precision cannot hold is found below.
         with np.errstate(all="ignore"):
-            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            length = np.linalg.norm(normals, axis=1, keepdims=True)
-            part["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
-            part["corners"] = corners
-        moved = max(moved, float(np.abs(part["corners"] - corners).max()))
+            moved = max(moved, float(np.abs(part.astype(np.float32) - part).max(initial=0.0)))
     size = float(np.max(mesh.extent[1] - mesh.extent[0]))
     if moved > _MOST_MOVED * size:
         raise FormatError(
             f"STL keeps single precision, which would move vertices by {moved:.3g} in a part of size {size:.3g}"
         )
-    title = f"truefield {mesh.name}".encode("ascii", "replace")[:80].ljust(80)
-    return b"".join((title, len(facets).to_bytes(4, "little"), facets.data))
+    stream.write(f"truefield {mesh.name}".encode("ascii", "replace")[:80].ljust(80))
+    stream.write(len(mesh.triangles).to_bytes(4, "little"))
+    for start in range(0, len(mesh.triangles), _CHUNK):
+        corners = mesh.vertices[mesh.triangles[start : start + _CHUNK]]
+        facets = np.zeros(len(corners), dtype=_FACET)
+        with np.errstate(all="ignore"):
+            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            length = np.linalg.norm(normals, axis=1, keepdims=True)
+            facets["normal"] = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+        facets["corners"] = corners
+        stream.write(facets.data)
