@@ -75,6 +75,21 @@ fn coarser_fields_are_honest_and_monotone() {
 }
 
 #[test]
+fn fields_cut_by_depth_are_their_first_levels() {
+    let run = Run::default();
+    for reconstruction in [Reconstruction::Linear, Reconstruction::Cubic] {
+        let (fine, _) = edited(reconstruction);
+        for depth in 0..=fine.statistics().depth {
+            let mut levels = fine.to_levels();
+            levels.cut(depth);
+            let cut = level_of_detail(&fine, Detail::Depth(depth), &run).expect("a field").to_levels();
+            assert!(cut.levels == levels.levels && cut.edits == levels.edits && cut.coverage == levels.coverage);
+            assert_eq!(cut.accuracy.max_depth, fine.accuracy().max_depth.min(depth));
+        }
+    }
+}
+
+#[test]
 fn samples_merge_within_the_tolerance_and_hold() {
     let solid = Solid::new(Ball::new(0.3, 0.2, 0.1, 1.0), &[(Step::Carve, Ball::new(1.0, 0.3, 0.2, 0.5))]);
     let run = Run::default();

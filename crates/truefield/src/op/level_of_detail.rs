@@ -3,7 +3,7 @@
 //! Frisken et al. 2000 cut by depth, or where the error that every cell keeps is small enough.
 
 use crate::error::{Error, Result};
-use crate::field::adaptive::{Accuracy, AdaptiveField, Level, LevelKind, Levels, Record, about_corners, differences};
+use crate::field::adaptive::{Accuracy, AdaptiveField, Cell, Division, Frontier, Leaf, Record, about_corners, differences};
 use crate::geom::Interval;
 use crate::run::Run;
 
@@ -22,93 +22,93 @@ pub enum Detail {
 ///
 /// Where the shape itself leaves its distance open, the error is judged by how far the coarse values are from the fine.
 pub fn level_of_detail(field: &AdaptiveField, detail: Detail, run: &Run<'_>) -> Result<AdaptiveField> {
-    let mut levels = field.to_levels();
+    let own = field.accuracy();
     match detail {
-        Detail::Depth(depth) => {
-            levels.cut(depth);
-            levels.accuracy.max_depth = levels.accuracy.max_depth.min(depth);
-        }
+        Detail::Depth(depth) => field.cut(|cell| cell.depth() >= depth, Accuracy { max_depth: own.max_depth.min(depth), ..own }, run),
         Detail::Tolerance(tolerance) => {
             if !(tolerance > 0.0 && tolerance.is_finite()) {
                 return Err(Error::invalid(format!("the tolerance is {tolerance}; give a positive length")));
             }
-            let asked = Accuracy { tolerance, ..levels.accuracy };
-            levels = prune(&levels, asked);
-            levels.accuracy.tolerance = levels.accuracy.tolerance.max(tolerance);
+            let good = good_enough(field, Accuracy { tolerance, ..own }, run)?;
+            field.cut(|cell| good.holds(cell), Accuracy { tolerance: own.tolerance.max(tolerance), ..own }, run)
         }
     }
-    AdaptiveField::from_levels(&levels, field.surface().cloned(), run)
 }
 
-/// The tree without what is below cells that are good enough.
-fn prune(levels: &Levels, asked: Accuracy) -> Levels {
-    let leaves = judge(levels, asked);
-    let group = levels.root.division.children();
-    let mut out = Levels { levels: Vec::new(), ..levels.clone() };
-    let mut cells: Vec<usize> = vec![0];
-    for (level, ends) in levels.levels.iter().zip(&leaves) {
-        if cells.is_empty() {
-            break;
+/// Cells of this depth are judged as blocks of their own.
+const BLOCK_DEPTH: u32 = 3;
+
+/// The uppermost branches that are good enough as leaves.
+fn good_enough(field: &AdaptiveField, asked: Accuracy, run: &Run<'_>) -> Result<Frontier> {
+    let mut blocks = Vec::new();
+    field.walk(&mut |cell| {
+        let block = cell.depth() == BLOCK_DEPTH;
+        if block {
+            blocks.push(cell);
         }
-        let ranks = level.ranks();
-        let mut kept = Level::default();
-        let mut below = Vec::new();
-        for &cell in &cells {
-            let (kind, rank) = (level.kinds[cell], ranks[cell] as usize);
-            let kind = if ends[cell] { LevelKind::Linear } else { kind };
-            match kind {
-                LevelKind::Branch => below.extend(rank * group..(rank + 1) * group),
-                LevelKind::Linear => {}
-                LevelKind::Cubic => kept.cubics.push(level.cubics[rank]),
-                LevelKind::Exact => {
-                    let (side, list) = level.lists.get(rank);
-                    kept.lists.push(side, list);
-                }
-            }
-            kept.push(kind, level.records[cell]);
-        }
-        out.levels.push(kept);
-        cells = below;
-    }
-    out
+        !block
+    });
+    let judge = Judge { asked, own: field.accuracy(), division: field.division(), run };
+    let judged = run.blocks("judge the cells", blocks.len(), |number| {
+        let mut good = Frontier::default();
+        let differs = judge.below(&blocks[number], &mut good, &mut |_, _| None)?;
+        Ok((differs, good))
+    })?;
+    let mut judged = judged.into_iter();
+    let mut good = Frontier::default();
+    judge.below(&field.root(), &mut good, &mut |cell, good| {
+        // Walks meet the blocks in the same order.
+        let (differs, below) = if cell.depth() == BLOCK_DEPTH { judged.next()? } else { return None };
+        good.append(below);
+        Some(differs)
+    })?;
+    Ok(good)
 }
 
-/// Of each cell, whether it is a branch that is good enough as a leaf.
-fn judge(levels: &Levels, asked: Accuracy) -> Vec<Vec<bool>> {
-    let (division, own) = (levels.root.division, levels.accuracy);
-    let mut out: Vec<Vec<bool>> = Vec::new();
-    // Contains what the finest cells say minus what a cell's corners say.
-    let mut below: Vec<Interval> = Vec::new();
-    for level in levels.levels.iter().rev() {
-        let ranks = level.ranks();
-        let mut apart = Vec::with_capacity(level.kinds.len());
-        let mut ends = Vec::with_capacity(level.kinds.len());
-        for (cell, (&kind, record)) in level.kinds.iter().zip(&level.records).enumerate() {
-            let rank = ranks[cell] as usize;
-            let differs = match kind {
-                LevelKind::Linear => Interval::exact(0.0),
-                LevelKind::Cubic => about_corners(&Record { lower: 0.0, upper: 0.0, ..*record }, Some(&level.cubics[rank])),
-                LevelKind::Exact => record.error(),
-                LevelKind::Branch => {
-                    let group = division.children();
-                    let first = rank * group;
-                    let parts = (0..group).map(|octant| {
-                        let child = &levels.levels[levels.levels.len() - out.len()].records[first + octant];
-                        below[first + octant].plus(differences(record, &child.corners, division, octant))
-                    });
-                    parts.reduce(Interval::hull).unwrap_or(Interval::ALL)
-                }
-            };
-            let range = record.range().plus(differs);
-            let least = range.lower.max(-range.upper).max(0.0);
-            let largest = |error: Interval| error.upper.max(-error.lower);
-            let error = largest(record.error()).min(largest(differs) + own.allowed(least));
-            ends.push(kind == LevelKind::Branch && error <= asked.allowed(least));
-            apart.push(differs);
+/// What decides whether a branch is good enough as a leaf.
+struct Judge<'a> {
+    asked: Accuracy,
+    own: Accuracy,
+    division: Division,
+    run: &'a Run<'a>,
+}
+
+impl Judge<'_> {
+    /// Contains what the finest cells say minus what a cell's corners say; adds the uppermost branches from it down that
+    /// are good enough. What `known` knows of a cell is not looked at again.
+    fn below(
+        &self,
+        cell: &Cell<'_>,
+        good: &mut Frontier,
+        known: &mut impl FnMut(&Cell<'_>, &mut Frontier) -> Option<Interval>,
+    ) -> Result<Interval> {
+        if let Some(differs) = known(cell, good) {
+            return Ok(differs);
         }
-        below = apart;
-        out.push(ends);
+        let (record, before) = (cell.record(), good.len());
+        if cell.is_leaf() {
+            return Ok(match cell.leaf() {
+                Leaf::Linear => Interval::exact(0.0),
+                Leaf::Cubic(samples) => about_corners(&Record { lower: 0.0, upper: 0.0, ..*record }, Some(samples)),
+                Leaf::Exact(_) => record.error(),
+            });
+        }
+        self.run.cancel.check()?;
+        let mut differs: Option<Interval> = None;
+        for octant in 0..cell.children() {
+            let child = cell.child(octant);
+            let apart = self.below(&child, good, known)?.plus(differences(record, child.corners(), self.division, octant));
+            differs = Some(differs.map_or(apart, |differs| differs.hull(apart)));
+        }
+        let differs = differs.unwrap_or(Interval::ALL);
+        let range = record.range().plus(differs);
+        let least = range.lower.max(-range.upper).max(0.0);
+        let largest = |error: Interval| error.upper.max(-error.lower);
+        let error = largest(record.error()).min(largest(differs) + self.own.allowed(least));
+        if error <= self.asked.allowed(least) {
+            good.truncate(before);
+            good.push(cell);
+        }
+        Ok(differs)
     }
-    out.reverse();
-    out
 }

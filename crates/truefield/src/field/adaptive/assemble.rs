@@ -115,15 +115,20 @@ impl<'a> Tree for Patch<'a> {
                 Patched::Exact(_, side, list) => return Shape::Exact(*side, list),
             },
         };
-        if !cell.is_leaf() {
-            children.extend((0..cell.children()).map(|octant| Place::Old(cell.child(octant))));
-            return Shape::Branch;
-        }
-        match cell.leaf() {
-            Leaf::Linear => Shape::Linear,
-            Leaf::Cubic(samples) => Shape::Cubic(samples),
-            Leaf::Exact(list) => Shape::Exact(cell.list_side(), list),
-        }
+        kept(cell, children, Place::Old)
+    }
+}
+
+/// What a cell of a field is, with its children as nodes of another tree.
+pub(super) fn kept<'a, N>(cell: Cell<'a>, children: &mut Vec<N>, node: impl Fn(Cell<'a>) -> N) -> Shape<'a> {
+    if !cell.is_leaf() {
+        children.extend((0..cell.children()).map(|octant| node(cell.child(octant))));
+        return Shape::Branch;
+    }
+    match cell.leaf() {
+        Leaf::Linear => Shape::Linear,
+        Leaf::Cubic(samples) => Shape::Cubic(samples),
+        Leaf::Exact(list) => Shape::Exact(cell.list_side(), list),
     }
 }
 
