@@ -373,7 +373,7 @@ def voxelize(
     memory: int,
     threads: int | None = None,
     progress: _Progress = None,
-) -> tuple[NDArray[np.bool_], NDArray[np.uint64], NDArray[np.int64], _Floats, int]: ...
+) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64], _Floats, int]: ...
 def wavefront(
     sites: NDArray[np.bool_],
     shape: list[int],

@@ -1,6 +1,6 @@
 //! Voxels of surfaces, and what marches through voxels.
 
-use numpy::{IntoPyArray, PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::sync::Arc;
 use truefield::build::difference::difference;
@@ -18,8 +18,8 @@ use crate::surface::PySurface;
 type Sites<'py> = Bound<'py, PyArray1<u32>>;
 type Singles<'py> = Bound<'py, PyArray1<f32>>;
 
-/// `(marks, voxel, triangle, distance, doubtful)`.
-type VoxelArrays<'py> = (Bound<'py, PyArray3<bool>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, u64);
+/// `(marks, index, triangle, distance, doubtful)`.
+type VoxelArrays<'py> = (Bound<'py, PyArray3<bool>>, Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>, u64);
 
 /// Voxels of a surface by a rule; `origin` is the centre of the first.
 #[pyfunction]
@@ -47,9 +47,10 @@ pub fn voxels_of<'py>(
     };
     let grid = Grid { origin: DVec3::from_array(origin) - 0.5 * spacing, spacing, first: [0; 3], shape };
     let found = job(py, threads, progress, |run| voxelize(&surface.0, &grid, rule, memory, run))?;
+    let index: Vec<[i64; 3]> = found.near.iter().map(|near| found.index(near.voxel).map(|i| i as i64)).collect();
     Ok((
         found.marks.into_pyarray(py).reshape(shape.map(|n| n as usize))?,
-        column(py, found.near.iter().map(|near| near.voxel)),
+        index.into_flattened().into_pyarray(py).reshape([found.near.len(), 3])?,
         column(py, found.near.iter().map(|near| i64::from(near.triangle))),
         column(py, found.near.iter().map(|near| near.distance)),
         found.doubtful,

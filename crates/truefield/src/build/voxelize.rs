@@ -61,6 +61,14 @@ pub struct Voxels {
     pub doubtful: u64,
 }
 
+impl Voxels {
+    /// Index of a voxel along each axis, from its linear one.
+    pub fn index(&self, voxel: u64) -> [u64; 3] {
+        let [_, ny, nz] = self.grid.shape.map(u64::from);
+        [voxel / (ny * nz), voxel / nz % ny, voxel % nz]
+    }
+}
+
 /// Marks voxels of `surface` among the cells of `grid`.
 ///
 /// Takes a byte a voxel and 24 for every marked voxel of the surface; refuses more than `memory` bytes.
@@ -73,7 +81,8 @@ pub fn voxelize(surface: &Surface, grid: &Grid, rule: Rule, memory: u64, run: &R
     };
     let found = classify(surface, grid, wanted, memory, run)?;
     let bit = if rule == Rule::Solid { INSIDE } else { TOUCHED };
-    let marks = found.classes.iter().map(|class| class & bit != 0).collect();
+    // In the memory of the classes.
+    let marks = found.classes.into_iter().map(|class| class & bit != 0).collect();
     Ok(Voxels { grid: *grid, marks, near: found.near, doubtful: found.doubtful })
 }
 
