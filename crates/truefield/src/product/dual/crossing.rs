@@ -77,7 +77,7 @@ pub(super) fn crossings(copy: &Copy<'_>, distance: f64, run: &Run<'_>) -> Result
         });
         Ok(found)
     })?;
-    Ok(found.concat())
+    Ok(super::joined(found))
 }
 
 /// Divides the work.

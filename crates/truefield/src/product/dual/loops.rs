@@ -68,7 +68,7 @@ impl Places {
 pub(super) struct Pairs {
     partner: Vec<AtomicU32>,
     /// Of each face with more than one pair, one place of each pair.
-    pub crowded: Vec<Vec<u32>>,
+    crowded: Vec<Vec<u32>>,
 }
 
 impl Pairs {
@@ -113,6 +113,12 @@ impl Pairs {
             Ok(crowded)
         })?;
         Ok(Self { partner, crowded: crowded.concat() })
+    }
+
+    /// Of each face with more than one pair, the faces of both crossings of each.
+    pub fn into_crowded(self) -> Vec<Vec<(u32, u32)>> {
+        let pair = |number: u32| (number, self.partner(number as usize));
+        self.crowded.iter().map(|face| face.iter().map(|&number| pair(number)).collect()).collect()
     }
 
     /// The face of the crossing that another is paired with.
@@ -167,48 +173,36 @@ fn ambiguous(leaf: &Leaf<'_>, face: &[(u8, u32)], crossings: &[Crossing], distan
     pairs
 }
 
-/// Loops of the leaves: how many there are, and which one each place belongs to.
-#[derive(Debug)]
-pub(super) struct Loops {
-    /// By chunk of leaves: of each place, in the order of its leaf, the loop within the leaf.
-    pub labels: Vec<Vec<u32>>,
-    /// By chunk, how many loops its leaves have together.
-    pub counts: Vec<usize>,
-}
-
-impl Loops {
-    /// Follows pairs around each leaf.
-    pub fn of(crossings: &[Crossing], places: &Places, pairs: &Pairs, run: &Run<'_>) -> Result<Self> {
-        let found = run.blocks("join crossings", places.chunks(), |chunk| {
-            let (mut labels, mut count) = (Vec::new(), 0);
-            let mut sets = Sets::new(0);
-            for number in places.chunk(chunk) {
-                let around = places.around(number);
-                sets.reset(around.len());
-                for (i, &place) in around.iter().enumerate() {
-                    let (e, k) = (place as usize / 4, place as usize % 4);
-                    for face in [(k + 3) % 4, crossings[e].last(k)] {
-                        let other = pairs.partner(4 * e + face) / 4;
-                        // Of this crossing the leaf has one place.
-                        let j = around.partition_point(|place| place / 4 < other);
-                        if j < around.len() {
-                            sets.join(i as u32, j as u32);
-                        }
+/// Follows pairs around each leaf to loops, and numbers these by chunk of leaves: each place is told its loop's number in
+/// `own`. How many loops each chunk has.
+pub(super) fn number_loops(crossings: &[Crossing], places: &Places, pairs: &Pairs, own: &[AtomicU32], run: &Run<'_>) -> Result<Vec<usize>> {
+    run.blocks("join crossings", places.chunks(), |chunk| {
+        let mut count = 0;
+        let mut sets = Sets::new(0);
+        let mut numbers: Vec<u32> = Vec::new();
+        for number in places.chunk(chunk) {
+            let around = places.around(number);
+            sets.reset(around.len());
+            for (i, &place) in around.iter().enumerate() {
+                let (e, k) = (place as usize / 4, place as usize % 4);
+                for face in [(k + 3) % 4, crossings[e].last(k)] {
+                    let other = pairs.partner(4 * e + face) / 4;
+                    // Of this crossing the leaf has one place.
+                    let j = around.partition_point(|place| place / 4 < other);
+                    if j < around.len() {
+                        sets.join(i as u32, j as u32);
                     }
                 }
-                let mut loops = 0;
-                let start = labels.len();
-                for i in 0..around.len() {
-                    let root = sets.find(i as u32) as usize;
-                    let label = if root == i { loops } else { labels[start + root] };
-                    loops += u32::from(root == i);
-                    labels.push(label);
-                }
-                count += loops as usize;
             }
-            Ok((labels, count))
-        })?;
-        let (labels, counts) = found.into_iter().unzip();
-        Ok(Self { labels, counts })
-    }
+            numbers.clear();
+            for (i, &place) in around.iter().enumerate() {
+                let root = sets.find(i as u32) as usize;
+                let number = if root == i { count } else { numbers[root] };
+                count += u32::from(root == i);
+                numbers.push(number);
+                own[place as usize].store(number, Ordering::Relaxed);
+            }
+        }
+        Ok(count as usize)
+    })
 }

@@ -13,9 +13,10 @@ mod skeleton;
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use crossing::{Crossing, crossings, divide};
-use loops::{Loops, Pairs, Places};
+use loops::{Pairs, Places, number_loops};
 use place::Smooth;
 use skeleton::{Copy, Leaf};
 
@@ -44,7 +45,7 @@ const CHUNK: usize = 8192;
 /// Normals are the field's, which rounds edges off within its tolerance. Where `shape`, whose field it is, is given, it is
 /// asked about each crossed edge some ten times, and sharp edges and corners are kept.
 ///
-/// Needs some 200 bytes a vertex while it runs; refuses more than `memory` bytes, a `distance` that is not finite, one
+/// Takes some 400 bytes a vertex while it runs, most of it for the cells about the surface; refuses more than `memory` bytes, a `distance` that is not finite, one
 /// that no corner is below, and one at which the surface of a solid inside the domain would leave it.
 pub fn surface(field: &AdaptiveField, distance: f64, shape: Option<&dyn Source>, memory: u64, run: &Run<'_>) -> Result<TriangleMesh> {
     if !distance.is_finite() {
@@ -54,81 +55,110 @@ pub fn surface(field: &AdaptiveField, distance: f64, shape: Option<&dyn Source>,
     let mut copy = Copy::of(field, distance, run)?;
     divide(&mut copy);
     let mut crossings = crossings(&copy, distance, run)?;
+    let cells = copy.skeleton.leaves.len() as u64;
+    let (leaves, size) = used(copy, &mut crossings);
     if crossings.is_empty() {
         return Err(Error::invalid(format!(
             "no surface is at distance {distance}: no corner of a cell is below it; choose another distance"
         )));
     }
-    let leaves = &copy.skeleton.leaves;
     let per_crossing = (size_of::<Crossing>() + 4 * size_of::<u32>() * 3 + 2 * size_of::<[u32; 3]>() + size_of::<DVec3>()) as u64;
-    let needed = leaves.len() as u64 * (size_of::<Leaf<'_>>() + 8) as u64 + crossings.len() as u64 * per_crossing;
+    let needed = cells * (2 * size_of::<Leaf<'_>>() + 8) as u64 + crossings.len() as u64 * per_crossing;
     if needed > memory || crossings.len() >= 1 << 29 {
         return Err(Error::Memory { what: format!("a surface around {} crossed edges", crossings.len()), needed, allowed: memory });
     }
     run.cancel.check()?;
     let places = Places::of(&crossings, leaves.len());
     if let Some(shape) = shape {
-        sharp::sharpen(&mut crossings, leaves, shape, distance, run)?;
+        sharp::sharpen(&mut crossings, &leaves, size, shape, distance, run)?;
     }
-    let pairs = Pairs::of(&crossings, leaves, &places, distance, run)?;
-    let loops = Loops::of(&crossings, &places, &pairs, run)?;
-
-    // Vertices, and which one each place has.
+    let pairs = Pairs::of(&crossings, &leaves, &places, distance, run)?;
+    // Which vertex each place has: first within its chunk of leaves, then of all.
     let own: Vec<AtomicU32> = std::iter::repeat_with(|| AtomicU32::new(0)).take(4 * crossings.len()).collect();
-    let firsts = firsts(&loops.counts);
-    let blocks = run.blocks("place vertices", places.chunks(), |chunk| {
-        let mut vertices = Vec::with_capacity(loops.counts[chunk]);
-        let mut labels = loops.labels[chunk].iter();
+    let counts = number_loops(&crossings, &places, &pairs, &own, run)?;
+    let crowded = pairs.into_crowded();
+
+    let mut vertices = vec![DVec3::ZERO; counts.iter().sum()];
+    let (mut parts, mut rest, mut first) = (Vec::with_capacity(counts.len()), &mut vertices[..], 0);
+    for count in counts {
+        let (part, after) = rest.split_at_mut(count);
+        parts.push((first, Mutex::new(part)));
+        (rest, first) = (after, first + count);
+    }
+    run.blocks("place vertices", parts.len(), |chunk| {
+        let (first, part) = &parts[chunk];
+        let mut vertices = part.lock().unwrap_or_else(PoisonError::into_inner);
         let (mut tagged, mut points) = (Vec::new(), Vec::new());
         for number in places.chunk(chunk) {
             let around = places.around(number);
-            if around.is_empty() {
-                continue;
-            }
             tagged.clear();
-            tagged.extend(labels.by_ref().copied().zip(around.iter().copied()).take(around.len()));
+            tagged.extend(around.iter().map(|&place| (own[place as usize].load(Ordering::Relaxed), place)));
             tagged.sort_unstable();
             let leaf = &leaves[number];
             let extent = leaf.extent();
             let smooth = if leaf.on_border || shape.is_some() { Smooth::Left } else { Smooth::Followed };
             for piece in tagged.chunk_by(|a, b| a.0 == b.0) {
                 points.clear();
+                let vertex = piece[0].0;
                 for &(_, place) in piece {
-                    own[place as usize].store((firsts[chunk] + vertices.len()) as u32, Ordering::Relaxed);
+                    own[place as usize].store(*first as u32 + vertex, Ordering::Relaxed);
                     let crossing = &crossings[place as usize / 4];
                     points.push((crossing.point, DVec3::from_array(crossing.normal.map(f64::from))));
                 }
-                vertices.push(place::vertex(&points, &leaf.cell, &extent, distance, smooth));
+                vertices[vertex as usize] = place::vertex(&points, &leaf.cell, &extent, distance, smooth);
             }
         }
-        Ok(vertices)
+        Ok(())
     })?;
-    let mut vertices = blocks.concat();
-    let middles = middles(&crossings, &pairs, &own, &mut vertices);
-    polygons(&crossings, leaves, &own, &middles, vertices, run)
+    drop((parts, places));
+    let depths: Vec<u32> = leaves.iter().map(|leaf| leaf.cell.depth()).collect();
+    drop(leaves);
+    let middles = middles(&crossings, &crowded, &own, &mut vertices);
+    polygons(&crossings, &depths, &own, &middles, vertices, run)
 }
 
-fn firsts(counts: &[usize]) -> Vec<usize> {
+/// The leaves around crossings, which name them by their new numbers, and the size of the first leaf of all.
+fn used<'a>(copy: Copy<'a>, crossings: &mut [Crossing]) -> (Vec<Leaf<'a>>, f64) {
+    let mut leaves = copy.skeleton.leaves;
+    let size = leaves.first().map_or(0.0, |leaf| leaf.extent().diagonal());
+    let mut numbers = vec![0u32; leaves.len()];
+    for leaf in crossings.iter().flat_map(|crossing| crossing.leaves) {
+        numbers[leaf as usize] = 1;
+    }
+    let mut old = numbers.iter();
+    leaves.retain(|_| old.next() == Some(&1));
+    leaves.shrink_to_fit();
     let mut before = 0;
-    let starts = counts.iter().map(|count| {
-        before += count;
-        before - count
-    });
-    starts.collect()
+    for number in &mut numbers {
+        before += *number;
+        *number = before - *number;
+    }
+    for crossing in crossings {
+        crossing.leaves = crossing.leaves.map(|leaf| numbers[leaf as usize]);
+    }
+    (leaves, size)
+}
+
+/// All parts, one after the other; each is let go once it is copied.
+fn joined<T>(parts: Vec<Vec<T>>) -> Vec<T> {
+    let mut all = Vec::with_capacity(parts.iter().map(Vec::len).sum());
+    for part in parts {
+        all.extend(part);
+    }
+    all
 }
 
 /// Vertices on faces where more than one pair joins the same two vertices, whose common side would have more than two
 /// triangles: by face of a crossing.
-fn middles(crossings: &[Crossing], pairs: &Pairs, own: &[AtomicU32], vertices: &mut Vec<DVec3>) -> BTreeMap<u32, u32> {
+fn middles(crossings: &[Crossing], crowded: &[Vec<(u32, u32)>], own: &[AtomicU32], vertices: &mut Vec<DVec3>) -> BTreeMap<u32, u32> {
     let mut middles = BTreeMap::new();
-    for face in &pairs.crowded {
+    for face in crowded {
         let mut joined = Vec::new();
-        for &number in face {
+        for &(number, other) in face {
             let (e, k) = (number as usize / 4, number as usize % 4);
             let [a, b] = [k, (k + 1) % 4].map(|k| vertex_of(&crossings[e], own, e, k));
             let ends = [a.min(b), a.max(b)];
             if joined.contains(&ends) {
-                let other = pairs.partner(number as usize);
                 middles.insert(number, vertices.len() as u32);
                 middles.insert(other, vertices.len() as u32);
                 vertices.push(0.5 * (crossings[e].point + crossings[other as usize / 4].point));
@@ -148,7 +178,7 @@ fn vertex_of(crossing: &Crossing, own: &[AtomicU32], e: usize, k: usize) -> u32 
 
 fn polygons(
     crossings: &[Crossing],
-    leaves: &[Leaf<'_>],
+    depths: &[u32],
     own: &[AtomicU32],
     middles: &BTreeMap<u32, u32>,
     mut vertices: Vec<DVec3>,
@@ -189,7 +219,7 @@ fn polygons(
                 put([rim[0], rim[1], rim[2]]);
                 continue;
             }
-            for half in polygon::halves(crossing, leaves, rim.map(|v| vertices[v as usize])) {
+            for half in polygon::halves(crossing, depths, rim.map(|v| vertices[v as usize])) {
                 put(half.map(|k| rim[k]));
             }
         }
@@ -199,5 +229,5 @@ fn polygons(
     if !(extent.diagonal() > 0.0) {
         return Err(Error::invalid("the surface has shrunk to a point; choose another distance"));
     }
-    TriangleMesh::new(vertices, parts.concat())
+    TriangleMesh::new(vertices, joined(parts))
 }

@@ -1,15 +1,14 @@
 //! The polygon around a crossing, in triangles.
 
 use super::crossing::Crossing;
-use super::skeleton::Leaf;
 use crate::geom::{DVec3, Facet};
 
 /// Two triangles of a four-sided polygon, named by their places around the crossing.
 ///
 /// A diagonal must end in a leaf that has the crossed edge as an edge of its own: any two other leaves may be opposite each
 /// other about more edges than this, and four triangles would meet in the one side that they then share.
-pub(super) fn halves(crossing: &Crossing, leaves: &[Leaf<'_>], corners: [DVec3; 4]) -> [[usize; 3]; 2] {
-    let depth = crossing.leaves.map(|leaf| leaves[leaf as usize].cell.depth());
+pub(super) fn halves(crossing: &Crossing, depths: &[u32], corners: [DVec3; 4]) -> [[usize; 3]; 2] {
+    let depth = crossing.leaves.map(|leaf| depths[leaf as usize]);
     let most = depth.into_iter().fold(0, u32::max);
     let [even, odd] = [[[0, 1, 2], [0, 2, 3]], [[1, 2, 3], [1, 3, 0]]];
     match [depth[0] == most || depth[2] == most, depth[1] == most || depth[3] == most] {

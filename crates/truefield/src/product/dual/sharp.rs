@@ -13,13 +13,19 @@ const ROUNDS: usize = 16;
 /// Crossings that a worker takes at a time.
 const CHUNK: usize = 1024;
 
-/// Moves crossings to where the shape is at the distance, with the shape's own gradients.
-pub(super) fn sharpen(crossings: &mut [Crossing], leaves: &[Leaf<'_>], shape: &dyn Source, distance: f64, run: &Run<'_>) -> Result<()> {
+/// Moves crossings to where the shape is at the distance, with the shape's own gradients; `size` is that of a large leaf.
+pub(super) fn sharpen(
+    crossings: &mut [Crossing],
+    leaves: &[Leaf<'_>],
+    size: f64,
+    shape: &dyn Source,
+    distance: f64,
+    run: &Run<'_>,
+) -> Result<()> {
     let own = |crossing: &Crossing| crossing.leaves.map(|leaf| &leaves[leaf as usize]).into_iter().max_by_key(|leaf| leaf.cell.depth());
     // What is closed at the border of the domain is not the shape's.
     let wanted = |e: &usize| own(&crossings[*e]).is_some_and(|leaf| !leaf.on_border);
     let list: Vec<usize> = (0..crossings.len()).filter(wanted).collect();
-    let size = leaves.first().map_or(0.0, |leaf| leaf.extent().diagonal());
     // No nearer than the shape's own values tell apart.
     let close = (1e-12 * size).max(shape.noise().min(1e-9 * size));
     let found = run.blocks("ask the shape", list.len().div_ceil(CHUNK), |chunk| {

@@ -132,6 +132,8 @@ impl<'a> Copy<'a> {
                 let root = copy.add(blocks[number], part, distance);
                 Ok((copy, root))
             })?;
+            skeleton.nodes.reserve_exact(copies.iter().map(|(copy, _)| copy.nodes.len()).sum());
+            skeleton.leaves.reserve_exact(copies.iter().map(|(copy, _)| copy.leaves.len()).sum());
             let mut copied = Vec::with_capacity(copies.len());
             for (copy, root) in copies {
                 copied.push(skeleton.append(copy, root));
