@@ -194,3 +194,38 @@ def test_what_a_function_raises_is_heard_wherever_it_is_asked() -> None:
                     ask(points)
             with pytest.raises(tf.TruefieldError, match="the function"):
                 tf.collide(one, csg.sphere(1.0))
+
+
+@pytest.mark.parametrize("job", ["field", "distance", "bounds", "gradient"])
+def test_ctrl_c_between_calls_of_a_function(job: str) -> None:
+    import _thread
+    import time
+
+    rang: list[bool] = []
+    after = 0
+
+    def slow(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal after
+        # As a function that ends soon after; the exception is raised where the job was started.
+        after += bool(rang)
+        time.sleep(0.005)
+        return np.linalg.norm(points, axis=1) - 1.0 + 0.1 * np.sin(5.0 * points[:, 0])
+
+    shape = implicit.function(slow, lipschitz=2.0, domain=((-2, -2, -2), (2, 2, 2)))
+    points = np.random.default_rng(1).uniform(-2.0, 2.0, (200_000, 3))
+
+    def ring() -> None:
+        rang.append(True)
+        _thread.interrupt_main()
+
+    timer = threading.Timer(0.2, ring)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        while True:
+            if job == "field":
+                tf.adaptive_field(shape, 1e-7, memory=1 << 40)
+            else:
+                getattr(shape, job)(points)
+    timer.join()
+    # Half a second of calls.
+    assert after < 100

@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::field::Continuity;
 use crate::field::adaptive::{Accuracy, AdaptiveField, Coverage, Division, Level, LevelKind, Levels, MAX_DEPTH, Record, Root};
 use crate::geom::{Aabb, DVec3, Interval};
-use crate::run::Run;
+use crate::run::{Cancel, Run};
 
 pub use crate::field::adaptive::Rule;
 pub use coalesce::coalesce;
@@ -162,7 +162,7 @@ pub fn adaptive(source: &dyn Source, root: Root, rules: &Rules, run: &Run<'_>) -
     levels.coverage = Coverage::of(&root, source.extent());
     let mut cells = 0;
     for depth in 0.. {
-        let builder = Builder { source, root, rules, layout, depth };
+        let builder = Builder { source, root, rules, layout, depth, cancel: run.cancel };
         // The root has no parent.
         let parts = if depth == 0 {
             vec![builder.first()?]
@@ -222,6 +222,8 @@ struct Builder<'a> {
     layout: Layout,
     /// Of the cells that are made.
     depth: u32,
+    /// Looked at before every cell: a function may take long for each.
+    cancel: &'a Cancel,
 }
 
 impl Builder<'_> {
@@ -280,6 +282,7 @@ impl Builder<'_> {
 
     /// Makes a leaf of a cell that says enough, and else a branch. What the samples alone refuse is not proven.
     fn judge(&self, draft: &Draft<'_>, part: &mut Part) -> Result<()> {
+        self.cancel.check()?;
         let extent = self.root.cell(self.depth, draft.index);
         let block = self.layout.block(&extent, draft.points, draft.samples);
         let noise = self.source.noise_over(&extent);
