@@ -77,7 +77,7 @@ def letter() -> Image.Image:
     """The letter R as a quadtree: cells are large along straight edges and small at corners."""
     field = tf.adaptive_field(polygons.letter_r(), 2e-3, growth=np.inf)
     low, high = field.extent
-    side = SIZE[1]
+    side = SIZE[1] - 56  # the label goes below
     x, y = (np.linspace(low[axis], high[axis], side) for axis in (0, 1))
     points = np.stack(
         [*(g.ravel() for g in np.meshgrid(x, y[::-1])), np.full(side * side, 0.5 * (low[2] + high[2]))], 1

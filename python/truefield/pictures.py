@@ -105,17 +105,18 @@ def part_picture(
     size: tuple[int, int] = (1600, 1200),
     colour: Colour = _METAL,
     background: Colour | None = WHITE,
+    edges: bool = True,
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Image.Image:
-    """The part, opaque, with its sharp edges drawn.
+    """The part, opaque; with lines along its sharp edges unless `edges` is False, as for surfaces whose edges follow cells.
 
     Raises:
         TruefieldError: an input cannot be drawn; the sentence says why.
     """
     _check_size(size)
     scene = Scene()
-    _add_part(scene, mesh, size, colour=colour)
+    _add_part(scene, mesh, size, colour=colour, edges=edges)
     return _finished(_render(scene, _camera(mesh, view), size, background, (threads, progress)), path)
 
 
@@ -514,7 +515,13 @@ def _pen(size: tuple[int, int]) -> float:
 
 
 def _add_part(
-    scene: Scene, mesh: TriangleMesh, size: tuple[int, int], *, opacity: float = 1.0, colour: Colour | None = None
+    scene: Scene,
+    mesh: TriangleMesh,
+    size: tuple[int, int],
+    *,
+    opacity: float = 1.0,
+    colour: Colour | None = None,
+    edges: bool = True,
 ) -> None:
     solid = opacity >= 1.0
     scene.add_mesh(
@@ -523,7 +530,7 @@ def _add_part(
         np.array([colour or (_METAL if solid else _GLASS)], dtype=np.uint8),
         finish="satin" if solid else "polished",
         opacity=opacity,
-        ink=(_LINES, 0.7 if solid else 0.5, _pen(size)),
+        ink=(_LINES, 0.7 if solid else 0.5, _pen(size)) if edges else None,
     )
 
 
