@@ -209,7 +209,8 @@ def test_ctrl_c_between_calls_of_a_function(job: str) -> None:
         # As a function that ends soon after; the exception is raised where the job was started.
         after += bool(rang)
         time.sleep(0.005)
-        return np.linalg.norm(points, axis=1) - 1.0 + 0.1 * np.sin(5.0 * points[:, 0])
+        values: NDArray[np.float64] = np.linalg.norm(points, axis=1) - 1.0 + 0.1 * np.sin(5.0 * points[:, 0])
+        return values
 
     shape = implicit.function(slow, lipschitz=2.0, domain=((-2, -2, -2), (2, 2, 2)))
     points = np.random.default_rng(1).uniform(-2.0, 2.0, (200_000, 3))
@@ -218,14 +219,17 @@ def test_ctrl_c_between_calls_of_a_function(job: str) -> None:
         rang.append(True)
         _thread.interrupt_main()
 
-    timer = threading.Timer(0.2, ring)
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
+    def work() -> None:
         while True:
             if job == "field":
                 tf.adaptive_field(shape, 1e-7, memory=1 << 40)
             else:
                 getattr(shape, job)(points)
+
+    timer = threading.Timer(0.2, ring)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        work()
     timer.join()
     # Half a second of calls.
     assert after < 100

@@ -109,7 +109,7 @@ def part_picture(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Image.Image:
-    """The part, opaque; with lines along its sharp edges unless `edges` is False, as for surfaces whose edges follow cells.
+    """The part, opaque; with lines along its sharp edges, unless `edges` is False, as where these follow cells.
 
     Raises:
         TruefieldError: an input cannot be drawn; the sentence says why.
