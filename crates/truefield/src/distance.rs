@@ -62,11 +62,7 @@ pub trait Source: Distance {
         let mut values = vec![0.0; points.len()];
         self.values(points, &mut values)?;
         let size = self.extent().map_or(1.0, |extent| extent.diagonal());
-        let steps: Vec<f64> = points
-            .iter()
-            .zip(&values)
-            .map(|(p, value)| STEP * p.abs().max_element().max(value.abs()).max(size).max(f64::MIN_POSITIVE))
-            .collect();
+        let steps: Vec<f64> = points.iter().zip(&values).map(|(p, value)| step(*p, size).max(STEP * value.abs())).collect();
         let around: Vec<DVec3> = points
             .iter()
             .zip(&steps)
@@ -86,10 +82,10 @@ pub trait Source: Distance {
     /// No less than what [`Source::gradients`] says at a point and the value's gradient differ by, where there is one;
     /// infinite where that is not known, or the value there is not known within [`Source::noise`].
     ///
-    /// The default is what closed forms are good to; differences, which their steps add to, are not counted.
+    /// The default is what closed forms are good to, and what noise does to differences; how much the slope turns along the
+    /// steps of those is not counted.
     fn tilt(&self, p: DVec3) -> f64 {
-        let _ = p;
-        1e-8
+        1e-8 + 2.0 * self.noise() / step(p, self.extent().map_or(1.0, |extent| extent.diagonal()))
     }
 
     /// Contains the distance minus the value at every point of the cell; ends may be infinite.
@@ -231,3 +227,8 @@ impl<'a> SampleBlock<'a> {
 
 /// The step of a difference that balances its own error, of second order, and rounding.
 const STEP: f64 = 6e-6;
+
+/// No less than that step, of a shape of this size.
+fn step(p: DVec3, size: f64) -> f64 {
+    STEP * p.abs().max_element().max(size).max(f64::MIN_POSITIVE)
+}

@@ -50,7 +50,7 @@ pub fn slack(shape: &dyn Source, cell: &Aabb, beside: Option<DVec3>, unit: impl 
 fn straight(asked: &Asked<'_>, cell: &Aabb, unit: impl Fn(&Aabb) -> bool) -> bool {
     let radius = cell.radius() * (1.0 + 1e-9);
     let foot = asked.p - asked.gradient * asked.value;
-    let mut reach = radius;
+    let (mut reach, mut tilt) = (radius, None);
     // Nearest points spread as far as the slope turns over the way; the box that is looked at has to hold them.
     for _ in 0..3 {
         let whole = around(cell, foot, reach);
@@ -60,9 +60,14 @@ fn straight(asked: &Asked<'_>, cell: &Aabb, unit: impl Fn(&Aabb) -> bool) -> boo
             return false;
         }
         let way = asked.value.abs();
-        let spread = radius * (1.0 + (way + radius) * most) * (1.0 + 1e-9) + 1e-8 * way + 2.0 * asked.rounding;
+        // A foot is as far off as the slope is, over the way; of what is not known to be steep no box is wide enough.
+        let off = *tilt.get_or_insert_with(|| asked.shape.tilt(asked.p)) * way;
+        let spread = radius * (1.0 + (way + radius) * most) * (1.0 + 1e-9) + off + 2.0 * asked.rounding;
         if spread <= reach {
             return unit(&whole);
+        }
+        if !spread.is_finite() {
+            return false;
         }
         reach = 1.5 * spread;
     }
