@@ -226,9 +226,14 @@ def field(
     hold both: the lower one is the distance to where surface may be, the upper one that to where it is for certain,
     which may be infinite. To give such a zero set a thickness, subtract a positive number.
 
+    From the middle of what is nearly a ball, all of it is as near: there `bounds` are cut off and wider, while
+    `distance` goes on until it is as near as elsewhere, which took from half a second (the root of a sum of squares) to
+    some ten seconds for a single point.
+
     Raises:
         TruefieldError: the domain is missing or no finite box, or the formula is nowhere negative in it; when asked,
-            the formula is not defined at a point of the domain.
+            the formula is not defined at a point of the domain, or `distance` is not found to that accuracy, because
+            too much of the surface is as near or rounding of the formula hides it.
     """
     if not isinstance(expression, Expression):
         raise TruefieldError(f"the expression is {expression!r}; make one from implicit.axes()")

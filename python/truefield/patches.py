@@ -43,7 +43,7 @@ def surface(
     Raises:
         TruefieldError: the array has another shape, numbers that are not finite, patches smaller than 1e-40 or larger
             than 1e40, or the patches do not close up; when asked, the side of a point next to the surface cannot be
-            decided.
+            decided, or the patches are so like a ball around it that a million pieces do not tell how near they are.
     """
     try:
         array = np.ascontiguousarray(control_points, dtype=np.float64)
