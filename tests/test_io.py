@@ -118,7 +118,7 @@ def test_files_are_read_and_written_piece_by_piece(tmp_path: Path, suffix: str) 
     path = tmp_path / f"torus{suffix}"
     result = torus.vertices.nbytes + torus.triangles.nbytes
     # The words of a piece of text, whatever the length of the file.
-    piece = 6 << 20
+    piece = 8 << 20
     tracemalloc.start()
     try:
         torus.write(path)

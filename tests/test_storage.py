@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import os
+import pickle
 import stat
 import struct
 import subprocess
@@ -17,7 +19,7 @@ import numpy as np
 import pytest
 import truefield as tf
 from solids import blob, cube
-from truefield import container
+from truefield import container, csg, storage
 
 START = struct.Struct("<8sIIQ")
 
@@ -460,3 +462,27 @@ def test_damaged_samples_are_one_sentence(tmp_path: Path) -> None:
     for at in range(0, len(good), 3):
         refused(tmp_path / "bad.tfield", good[:at])
         refused(tmp_path / "bad.tfield", good[:at] + bytes([good[at] ^ 1]) + good[at + 1 :])
+
+
+def test_what_answers_can_be_pickled_and_is_its_own_copy() -> None:
+    part = cube()
+    surface = tf.Surface(part, sign="winding")
+    shape = csg.sphere(1.0)
+    carved = tf.adaptive_field(part, 0.1).carve(csg.sphere(0.4))
+    points = np.random.default_rng(2).uniform(-0.5, 1.5, (200, 3))
+    report = tf.thickness(part, tolerance=0.1)
+    for one in (surface, tf.complete_field(surface, 6), carved, tf.sampled_field(part, 9), shape, part, report):
+        if not isinstance(one, tf.TriangleMesh | tf.ThicknessReport):
+            assert copy.copy(one) is one
+            assert copy.deepcopy(one) is one
+        if one is shape:
+            with pytest.raises(TypeError, match="pickle or save an adaptive field"):
+                pickle.dumps(one)
+            continue
+        again = pickle.loads(pickle.dumps(one))
+        if isinstance(one, tf.Surface | tf.CompleteField | tf.AdaptiveField | tf.SampledField):
+            assert np.array_equal(again.distance(points), one.distance(points), equal_nan=True)
+            assert np.array_equal(again.bounds(points), one.bounds(points), equal_nan=True)
+    assert pickle.loads(pickle.dumps(surface)).sign_rule == surface.sign_rule
+    with pytest.raises(tf.FileError, match="a packed field"):
+        storage.unpacked(storage.packed(carved)[:-1])

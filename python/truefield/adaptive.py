@@ -15,6 +15,7 @@ from truefield.csg import sweep
 from truefield.errors import TruefieldError
 from truefield.fields import Surface
 from truefield.files import PathLike
+from truefield.immutable import Immutable, Unpack
 from truefield.mesh import TriangleMesh
 from truefield.nearest import Nearest
 from truefield.sampled import SampledField
@@ -102,7 +103,7 @@ class _Made:
         return shape
 
 
-class AdaptiveField:
+class AdaptiveField(Immutable):
     """Distances at the corners of the cells of an octree, with a proven error for each cell. Immutable.
 
     Made by `adaptive_field`.
@@ -114,6 +115,12 @@ class AdaptiveField:
         """For makers of fields: the compiled field, and what it is of, where that is known."""
         self._native = native
         self._made = made
+
+    def __reduce__(self) -> tuple[Unpack, tuple[bytes]]:
+        """Pickles what `save` would write; the copy does not know its `shape`."""
+        from truefield import storage
+
+        return storage.unpacked, (storage.packed(self),)
 
     @property
     def shape(self) -> Shape | None:

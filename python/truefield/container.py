@@ -24,7 +24,7 @@ import os
 import stat
 import struct
 from collections.abc import Callable, Mapping
-from io import BufferedReader
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import IO, Any, Final, NamedTuple
 
@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from truefield.arguments import Progress
 from truefield.errors import FileError
-from truefield.files import PathLike, check_file, replacing
+from truefield.files import PathLike, check_file, replacing, size_of
 
 Header = dict[str, Any]
 Arrays = dict[str, NDArray[Any]]
@@ -60,20 +60,25 @@ def write(path: PathLike, header: Header, arrays: Mapping[str, NDArray[Any]], pr
         FileError: the file cannot be written.
     """
     check_file(path)
+    with replacing(path) as stream:
+        pack(stream, header, arrays, progress)
+
+
+def pack(stream: IO[bytes], header: Header, arrays: Mapping[str, NDArray[Any]], progress: Progress | None) -> None:
+    """Writes header and arrays to a stream; see `write`."""
     listed = [[name, array.dtype.str, list(array.shape)] for name, array in arrays.items()]
     if header.get("sums"):
         header = header | {"sums": {name: _sum(_bytes(array)) for name, array in arrays.items()}}
     text = json.dumps(header | {"arrays": listed}).encode("ascii")
     text += b" " * (-len(text) % 8)
     size = _START.size + len(text) + 2 * _DIGEST + sum(array.nbytes for array in arrays.values())
-    with replacing(path) as stream:
-        writer = _Writer(stream, size, progress)
-        writer.write(_START.pack(MARK, VERSION, len(text), size))
-        writer.write(text)
-        writer.seal()
-        for array in arrays.values():
-            writer.write(_bytes(array))
-        writer.seal()
+    writer = _Writer(stream, size, progress)
+    writer.write(_START.pack(MARK, VERSION, len(text), size))
+    writer.write(text)
+    writer.seal()
+    for array in arrays.values():
+        writer.write(_bytes(array))
+    writer.seal()
 
 
 def read(
@@ -93,7 +98,9 @@ def read(
     """
     try:
         with file.open("rb") as stream:
-            return _read(stream, file, check, progress, first)
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise FileError(f"cannot read '{file}': it is no ordinary file; give the name of a file that was saved")
+            return unpack(stream, file, check, progress, first)
     except FileNotFoundError:
         raise FileError(f"cannot read '{file}': there is no such file; check the name") from None
     except IsADirectoryError:
@@ -128,7 +135,7 @@ class _Writer:
 class _Reader:
     """Reads and sums up what it reads."""
 
-    def __init__(self, stream: BufferedReader, file: Path, size: int, progress: Progress | None) -> None:
+    def __init__(self, stream: BufferedReader | BytesIO, file: Path, size: int, progress: Progress | None) -> None:
         self._stream, self._file, self._size, self._progress = stream, file, size, progress
         self._sum = hashlib.blake2b(digest_size=_DIGEST)
         self._done = 0
@@ -155,34 +162,33 @@ class _Reader:
             raise _damaged(self._file)
 
 
-def _read(
-    stream: BufferedReader,
+def unpack(
+    stream: BufferedReader | BytesIO,
     file: Path,
     check: Callable[[Header], Mapping[str, Kept]],
-    progress: Progress | None,
-    first: Callable[[Header], int] | None,
+    progress: Progress | None = None,
+    first: Callable[[Header], int] | None = None,
 ) -> tuple[Header, Arrays]:
-    state = os.fstat(stream.fileno())
-    if not stat.S_ISREG(state.st_mode):
-        raise FileError(f"cannot read '{file}': it is no ordinary file; give the name of a file that was saved")
-    reader = _Reader(stream, file, state.st_size, progress)
-    start = reader.read(min(state.st_size, _START.size))
+    """Header and arrays from a stream, which messages call `file`; see `read`."""
+    there = size_of(stream)
+    reader = _Reader(stream, file, there, progress)
+    start = reader.read(min(there, _START.size))
     if start[: len(MARK)] != MARK[: len(start)] or not start:
         raise FileError(
             f"'{file}' is not a truefield field: it does not begin as one; "
             "give a file that a field's save wrote, and meshes to truefield.read"
         )
     if len(start) < _START.size:
-        raise _truncated(file, state.st_size, None)
+        raise _truncated(file, there, None)
     _, version, header_size, size = _START.unpack(start)
     if version > VERSION:
         raise FileError(
             f"'{file}' was written by a newer truefield, in version {version} of the format, but this one reads "
             f"version {VERSION}; upgrade truefield"
         )
-    if state.st_size < size and (first is None or state.st_size < _START.size + header_size + _DIGEST):
-        raise _truncated(file, state.st_size, size)
-    if version < 1 or state.st_size > size or _START.size + header_size + 2 * _DIGEST > size:
+    if there < size and (first is None or there < _START.size + header_size + _DIGEST):
+        raise _truncated(file, there, size)
+    if version < 1 or there > size or _START.size + header_size + 2 * _DIGEST > size:
         raise _damaged(file)
     text = reader.read(header_size)
     reader.check()
@@ -196,12 +202,12 @@ def _read(
         raise FileError(f"'{file}' is no valid field: its arrays do not fill it; save it again")
     arrays: Arrays = {}
     sums = header.get("sums", {}) if first is not None else {}
-    left = state.st_size - _START.size - header_size - _DIGEST
+    left = there - _START.size - header_size - _DIGEST
     wanted = len(kept) if first is None else first(header)
     for name, (dtype, _) in list(kept.items())[:wanted]:
         left -= np.dtype(dtype).itemsize * _product(shapes[name])
         if left < 0:
-            raise _truncated(file, state.st_size, size)
+            raise _truncated(file, there, size)
         array = np.empty(shapes[name], dtype)
         reader.fill(_bytes(array))
         if first is not None and sums.get(name) != _sum(_bytes(array)):

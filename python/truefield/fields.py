@@ -17,6 +17,7 @@ from truefield.arguments import Floats, Progress
 from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.files import PathLike
+from truefield.immutable import Immutable, Unpack
 from truefield.mesh import TriangleMesh
 from truefield.nearest import Nearest
 from truefield.sampled import Placement, SampledField
@@ -34,7 +35,7 @@ class SignRule:
     reason: str
 
 
-class _Answering:
+class _Answering(Immutable):
     """What surfaces and complete fields share: the four questions."""
 
     __slots__ = ("_native",)
@@ -99,6 +100,10 @@ class Surface(_Answering):
         self._mesh = mesh
         self._sign: Sign = sign
         self._native = _truefield.Surface(mesh.vertices, mesh.triangles, sign, threads, progress)
+
+    def __reduce__(self) -> tuple[type[Surface], tuple[TriangleMesh, Sign]]:
+        """Pickles mesh and sign rule, of which the copy is built anew."""
+        return Surface, (self._mesh, self._sign)
 
     @property
     def mesh(self) -> TriangleMesh:
@@ -199,6 +204,12 @@ class CompleteField(_Answering):
         """Wraps the compiled field; `complete_field` is the way to make one."""
         self._native = native
         self._surface = surface
+
+    def __reduce__(self) -> tuple[Unpack, tuple[bytes]]:
+        """Pickles what `save` would write."""
+        from truefield import storage
+
+        return storage.unpacked, (storage.packed(self),)
 
     @property
     def surface(self) -> Surface:

@@ -88,6 +88,14 @@ def check_folder(path: PathLike) -> None:
         raise FileError(f"cannot write into {_shown(path)}: permission denied; choose another folder")
 
 
+def size_of(stream: IO[bytes]) -> int:
+    """The length of a file, which stays where it is."""
+    at = stream.tell()
+    end = stream.seek(0, 2)
+    stream.seek(at)
+    return end
+
+
 def _named(path: PathLike) -> Path:
     # The empty name would be the current folder's.
     if not os.fspath(path):

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truefield.errors import FileError, TruefieldError
-from truefield.files import PathLike
-from truefield.formats.polygons import FormatError, Soup, size_of
+from truefield.files import PathLike, size_of
+from truefield.formats.polygons import FormatError, Soup
 from truefield.mesh import TriangleMesh
 
 

@@ -15,6 +15,7 @@ from truefield.arguments import Floats, Progress
 from truefield.cloud import PointCloud
 from truefield.errors import TruefieldError
 from truefield.files import PathLike
+from truefield.immutable import Immutable, Unpack
 from truefield.mesh import TriangleMesh
 from truefield.nearest import Nearest
 from truefield.volume import Volume
@@ -24,7 +25,7 @@ Placement = Literal["lattice", "projected"]
 Side = Literal["inside", "outside"]
 
 
-class SampledField:
+class SampledField(Immutable):
     """Signed distances at lattice points in single precision, with what is known of the truth behind them.
 
     `Surface.sample` makes one of a part, `from_array` one of any array. It is asked like every field: between samples
@@ -37,6 +38,12 @@ class SampledField:
     def __init__(self, native: _truefield.SampledField) -> None:
         """Wraps the compiled field; `Surface.sample` and `from_array` make one."""
         self._native = native
+
+    def __reduce__(self) -> tuple[Unpack, tuple[bytes]]:
+        """Pickles what `save` would write."""
+        from truefield import storage
+
+        return storage.unpacked, (storage.packed(self),)
 
     @classmethod
     def from_array(

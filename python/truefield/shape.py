@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, Union
+from typing import TYPE_CHECKING, Literal, NoReturn, Union
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from truefield import _truefield, arguments
 from truefield.arguments import Floats, Progress
 from truefield.errors import TruefieldError
 from truefield.fields import Surface
+from truefield.immutable import Immutable
 from truefield.mesh import TriangleMesh
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _MOST_WRITTEN = 6
 
 
-class Shape:
+class Shape(Immutable):
     """A solid that answers distances; immutable. `truefield.csg` and `truefield.implicit` make them.
 
     `a | b` and `a + b` are the union, `a & b` the intersection, `a - b` the difference, `~a` and `-a` all that is
@@ -53,6 +54,10 @@ class Shape:
         self._ball = ball
         self._parts: tuple[Shape, ...] = (self,)
         self._cuts: tuple[Shape, tuple[Shape, ...]] = (self, ())
+
+    def __reduce__(self) -> NoReturn:
+        """Refuses to be pickled."""
+        raise TypeError("a shape cannot be pickled, as it may hold functions; pickle or save an adaptive field of it")
 
     @property
     def extent(self) -> tuple[Floats, Floats] | None:

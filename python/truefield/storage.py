@@ -26,6 +26,7 @@ tricubic, 3 exact. The levels from the first to any are a field.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final, get_args
 
@@ -76,6 +77,25 @@ def save(
     progress: Progress | None = None,
 ) -> None:
     """Writes a field to one file, for `load`; see the `save` of its kind."""
+    container.write(path, *_stored(field, threads, progress), progress)
+
+
+def packed(field: AdaptiveField | CompleteField | SampledField) -> bytes:
+    """What `save` would write."""
+    stream = BytesIO()
+    container.pack(stream, *_stored(field, None, None), None)
+    return stream.getvalue()
+
+
+def unpacked(data: bytes) -> AdaptiveField | CompleteField | SampledField:
+    """The field that was `packed`."""
+    name = Path("a packed field")
+    return _field(name, *container.unpack(BytesIO(data), name, _checked), None, None)
+
+
+def _stored(
+    field: AdaptiveField | CompleteField | SampledField, threads: int | None, progress: Progress | None
+) -> tuple[Header, Arrays]:
     arrays: Arrays
     if isinstance(field, CompleteField):
         surface, mesh = field.surface, field.mesh
@@ -112,8 +132,7 @@ def save(
         arrays = {"doubtful": doubtful, "values": field.values, "lower": bounds[0], "upper": bounds[1]}
         arrays = {name: array.reshape(-1) for name, array in arrays.items()}
         kept = _SAMPLED
-    stored = {name: np.ascontiguousarray(arrays.pop(name), dtype) for name, (dtype, _) in kept.items()}
-    container.write(path, header, stored, progress)
+    return header, {name: np.ascontiguousarray(arrays.pop(name), dtype) for name, (dtype, _) in kept.items()}
 
 
 def load(
@@ -145,6 +164,12 @@ def load(
             return len(_ADAPTIVE) + len(_LEVEL) * min(deepest + 1, int(header["levels"]))
 
     header, arrays = container.read(file, _checked, progress, first)
+    return _field(file, header, arrays, threads, progress)
+
+
+def _field(
+    file: Path, header: Header, arrays: Arrays, threads: int | None, progress: Progress | None
+) -> AdaptiveField | CompleteField | SampledField:
     try:
         if _kind(header) == "adaptive":
             return _adaptive(header, arrays, threads, progress)

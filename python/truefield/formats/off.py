@@ -36,6 +36,7 @@ def decode(stream: IO[bytes]) -> Soup:
         except FormatError as error:
             fault = error
         seen += len(lines)
+        lines.clear()  # before the next are read
     if seen != vertex_count + face_count:
         state = "is truncated" if seen < vertex_count + face_count else "goes on after its last face"
         raise FormatError(

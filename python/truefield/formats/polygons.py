@@ -61,14 +61,6 @@ def write_rows(stream: IO[bytes], line: str, rows: NDArray[_Number], added: int 
         stream.write("".join(line.format(*row) for row in part.tolist()).encode("ascii"))
 
 
-def size_of(stream: IO[bytes]) -> int:
-    """The length of a file, which stays where it is."""
-    at = stream.tell()
-    end = stream.seek(0, 2)
-    stream.seek(at)
-    return end
-
-
 def fan(corners: NDArray[np.int64], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
     """Triangles (m, 3) of polygons: each a fan around its first corner, in order.
 

@@ -7,7 +7,8 @@ from typing import IO, TYPE_CHECKING, Final
 import numpy as np
 
 from truefield._truefield import Distinct
-from truefield.formats.polygons import Column, FormatError, Soup, numbers, pieces, size_of
+from truefield.files import size_of
+from truefield.formats.polygons import Column, FormatError, Soup, numbers, pieces
 
 if TYPE_CHECKING:
     from truefield.mesh import TriangleMesh
