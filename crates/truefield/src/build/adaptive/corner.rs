@@ -26,12 +26,17 @@ pub(super) struct Corner {
 
 /// The nearest point of the surface and the side of a point, in the tree's units; `near` are points that may be near it.
 pub(super) fn corner(surface: &Surface, p: DVec3, near: &[Corner], side: Option<Side>) -> Corner {
+    let nearest = nearest(surface, p, near);
+    found(surface, p, Found { nearest, foot: surface.tree().facet(nearest.triangle).nearest(p).point }, side)
+}
+
+/// The nearest triangle of a point; `near` are points that may be near it.
+fn nearest(surface: &Surface, p: DVec3, near: &[Corner]) -> Candidate {
     let tree = surface.tree();
     let nearer = |a: &&Corner, b: &&Corner| (a.foot - p).length_squared().total_cmp(&(b.foot - p).length_squared());
     let hint = near.iter().min_by(nearer).map_or(Slot(0), |corner| corner.near);
     let start = Candidate { distance_squared: tree.facet_at(hint).distance_squared(p), triangle: tree.triangle(hint) };
-    let nearest = tree.nearest(p, start);
-    found(surface, p, Found { nearest, foot: tree.facet(nearest.triangle).nearest(p).point }, side)
+    tree.nearest(p, start)
 }
 
 /// The point whose nearest triangle was found.
@@ -64,15 +69,21 @@ pub(super) fn one_side(corners: &[Corner; 8]) -> Option<Side> {
     corners.iter().filter(|corner| corner.certain).max_by(farther).map(|corner| side_of(corner.value))
 }
 
-/// The side of a point that is so far from the surface, where that of one of `near` carries as far: two balls that overlap leave
-/// no room between them for the surface at which alone it changes.
-pub(super) fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner]) -> Option<Side> {
+/// The side of a point that is so far from the surface, where that of one of `near` carries as far off the surface: two balls that
+/// overlap leave no room between them for it. `carries` is how far sides do.
+pub(super) fn side_by(surface: &Surface, p: DVec3, distance: f64, near: &[Corner; 8], carries: &[f64; 8]) -> Option<Side> {
     let apart = ASKED * (surface.tree().radius + p.abs().max_element());
-    let carries = |corner: &&Corner| {
-        let reach = distance + corner.value.abs();
-        corner.certain && corner.value.abs() > apart && (corner.point - p).length_squared() * (1.0 + 1e-9) < reach * reach
+    let reaches = |corner: &Corner, carry: f64| {
+        let reach = (distance + corner.value.abs()).min(carry);
+        corner.value.abs() > apart && (corner.point - p).length_squared() * (1.0 + 1e-9) < reach * reach
     };
-    if distance > apart { near.iter().find(carries).map(|corner| side_of(corner.value)) } else { None }
+    let mut near = near.iter().zip(carries).filter(|_| distance > apart);
+    near.find(|(corner, carry)| reaches(corner, **carry)).map(|(corner, _)| side_of(corner.value))
+}
+
+/// How far the side of a point carries on paths off the surface.
+pub(super) fn carry(surface: &Surface, corner: &Corner) -> f64 {
+    if corner.certain { surface.carry(surface.tree().triangle(corner.near), corner.value.abs()).max(0.0) } else { 0.0 }
 }
 
 /// The side of a distance that is certain.
@@ -80,10 +91,13 @@ pub(super) fn side_of(value: f64) -> Side {
     if value.is_sign_negative() { Side::Inside } else { Side::Outside }
 }
 
-/// The one side of a ball that the surface does not touch, if that is certain.
-pub(super) fn side_of_ball(surface: &Surface, center: &Corner, radius: f64) -> Option<Side> {
-    let triangle = surface.tree().triangle(center.near);
-    surface.side_of_ball(center.point, &surface.tree().facet(triangle).nearest(center.point), triangle, radius)
+/// The one side of a ball that the surface does not touch, if that is certain; `near` are points that may be near its centre.
+pub(super) fn side_of_ball(surface: &Surface, center: DVec3, radius: f64, near: &[Corner]) -> Option<Side> {
+    let triangle = match near {
+        [same] if same.point == center => surface.tree().triangle(same.near),
+        _ => nearest(surface, center, near).triangle,
+    };
+    surface.side_of_ball(center, &surface.tree().facet(triangle).nearest(center), triangle, radius)
 }
 
 pub(super) fn list_side(side: Option<Side>) -> ListSide {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::cell::{Part, Seen, Start, place, within};
-use super::corner::{Corner, corner, found, list_side, one_side, side_by, side_of_ball};
+use super::corner::{Corner, carry, corner, found, list_side, one_side, side_by, side_of, side_of_ball};
 use super::facets::Prover;
 use super::halves::{CENTER, Halves, INNER, blend, of_part};
 use super::planes::Plane;
@@ -104,18 +104,15 @@ pub fn adaptive_mesh(surface: &Arc<Surface>, root: Root, leaves: Leaves, rules: 
     let continuity = if surface.side_changes_at_surface_only() { Continuity::Everywhere } else { Continuity::ExceptOpenings };
     let coverage = Coverage::of(&root, Some(surface.mesh().extent()));
     let mut levels: Vec<Level> = (0..tiles).map(|above| outer.level(above, scale)).collect();
-    // Along the curve the cells of one tile follow those of the one before, at every depth.
-    levels.push(Level::default());
-    for part in parts {
-        for (number, level) in part.into_iter().enumerate() {
-            let number = number + tiles as usize;
-            levels.resize_with(levels.len().max(number + 1), Level::default);
-            levels[number].append(level);
-        }
+    let mut last = Level::default();
+    for root in &parts {
+        last.push(root[0].kinds[0], root[0].records[0]);
     }
-    derive_errors(&mut levels[..=tiles as usize], Division::Octree);
-    let levels = Levels { coverage, levels, ..Levels::new(root, continuity, rules.accuracy()) };
-    AdaptiveField::from_levels(&levels, (leaves != Leaves::Linear).then(|| Arc::clone(surface)), run)
+    levels.push(last);
+    derive_errors(&mut levels, Division::Octree);
+    let whole = Levels { coverage, levels, ..Levels::new(root, continuity, rules.accuracy()) };
+    // Along the curve the cells of one tile follow those of the one before, at every depth.
+    AdaptiveField::from_tiles(&whole, tiles, &parts, (leaves != Leaves::Linear).then(|| Arc::clone(surface)), run)
 }
 
 /// What all tiles share.
@@ -197,12 +194,15 @@ impl<'a> Builder<'a> {
         start
     }
 
-    /// The side of a cell by a ball around it, where sides change elsewhere too.
-    fn settle(&self, mut start: Start, cell: &Aabb, corners: &[Corner; 8]) -> Start {
+    /// The side of a cell by one of its corners or a ball around it, where sides change elsewhere too; `near` are points that may be
+    /// near its centre.
+    fn settle(&self, mut start: Start, cell: &Aabb, corners: &[Corner; 8], near: &[Corner]) -> Start {
         let surface = self.job.surface;
         if start.side.is_none() && start.range.lower > 0.0 && !surface.side_changes_at_surface_only() {
-            let center = corner(surface, cell.center(), corners, None);
-            start.side = side_of_ball(surface, &center, cell.radius() * (1.0 + 1e-12) + self.prover.slack(cell));
+            let radius = cell.radius() * (1.0 + 1e-12) + self.prover.slack(cell);
+            let carries = |corner: &&Corner| carry(surface, corner) >= 2.0 * radius;
+            let by_corner = corners.iter().find(carries).map(|corner| side_of(corner.value));
+            start.side = by_corner.or_else(|| side_of_ball(surface, cell.center(), radius, near));
         }
         start
     }
@@ -224,7 +224,7 @@ impl<'a> Builder<'a> {
     fn see<'b>(&self, part: &'b Part) -> Seen<'b> {
         let scale = self.job.surface.scale();
         let Part { start, cell, corners } = part;
-        let start = self.settle(*start, cell, corners);
+        let start = self.settle(*start, cell, corners, corners);
         let values = corners.map(|corner| (corner.value / scale) as f32);
         let told = values.map(|v| f64::from(v) * scale);
         let limit = self.allowed(&start);
@@ -279,7 +279,8 @@ impl<'a> Builder<'a> {
             let ([x, y, z], tree) = (seen.start.node(CENTER), self.job.surface.tree());
             let center = self.job.lattice.corner(x, y, z);
             let squared = list.iter().fold(f64::INFINITY, |least, &slot| least.min(tree.facet_at(slot).distance_squared(center)));
-            self.narrow(&mut seen, squared.sqrt());
+            let corners = seen.corners;
+            self.narrow(&mut seen, squared.sqrt(), corners);
             if self.job.leaves == Leaves::Mixed {
                 seen.limit = self.allowed(&seen.start);
                 seen.known = self.prover.planes(&seen.at(list), seen.known).0;
@@ -302,7 +303,7 @@ impl<'a> Builder<'a> {
             self.ask(&seen.start, &mut halves, CENTER);
         }
         let list = if few { own.as_slice() } else { list };
-        self.narrow(&mut seen, halves.corner(CENTER).value.abs());
+        self.narrow(&mut seen, halves.corner(CENTER).value.abs(), std::slice::from_ref(halves.corner(CENTER)));
         seen.limit = self.allowed(&seen.start);
         let mut parts = self.parts.pop().unwrap_or_default();
         parts.clear();
@@ -329,11 +330,11 @@ impl<'a> Builder<'a> {
         done
     }
 
-    /// What follows for a cell from how far its centre is from the surface.
-    fn narrow(&self, seen: &mut Seen<'_>, far: f64) {
+    /// What follows for a cell from how far its centre is from the surface; `near` are points that may be near it.
+    fn narrow(&self, seen: &mut Seen<'_>, far: f64, near: &[Corner]) {
         let radius = seen.cell.radius() * (1.0 + 1e-12) + self.prover.slack(&seen.cell);
         let start = seen.start.within(Range { lower: far - radius, upper: far + radius });
-        seen.start = self.settle(self.look(start, &seen.cell, seen.corners), &seen.cell, seen.corners);
+        seen.start = self.settle(self.look(start, &seen.cell, seen.corners), &seen.cell, seen.corners, near);
     }
 
     /// Whether a cell with linear leaves need not be divided; and the lists of its parts, where they were needed to know.
@@ -519,16 +520,14 @@ impl<'a> Builder<'a> {
         self.octants.nearest(surface.tree(), list);
         let parted = surface.side_changes_at_surface_only();
         let near: [Corner; 8] = std::array::from_fn(|corner| *halves.corner(node(corner, corner)));
+        let carries = if start.side.is_none() { near.each_ref().map(|corner| carry(surface, corner)) } else { [0.0; 8] };
         for number in INNER {
             let place = start.node(number);
             let (p, answer) = (lattice.corner(place[0], place[1], place[2]), self.octants.found(number));
-            let found = || {
-                let distance = answer.nearest.distance_squared.sqrt();
-                let side = start.side.or_else(|| if parted { side_by(surface, p, distance, &near) } else { None });
-                found(surface, p, answer, side)
-            };
+            let side = start.side.or_else(|| side_by(surface, p, answer.nearest.distance_squared.sqrt(), &near, &carries));
+            let found = || found(surface, p, answer, side);
             // Only sides that have to be asked are dear.
-            let cheap = parted || start.side.is_some();
+            let cheap = parted || side.is_some();
             halves.set(number, if cheap { found() } else { *self.corners.entry(key(place)).or_insert_with(found) });
         }
     }

@@ -188,22 +188,34 @@ impl AdaptiveField {
     /// From flat arrays; `surface` is what exact leaves name the triangles of.
     pub fn from_levels(levels: &Levels, surface: Option<Arc<Surface>>, run: &Run<'_>) -> Result<Self> {
         levels.check(surface.as_ref().map_or(0, |surface| surface.mesh().triangles().len()))?;
-        let ranks: Vec<Vec<u32>> = levels.levels.iter().map(Level::ranks).collect();
-        let flat = Flat { levels, ranks: &ranks, group: levels.root.division.children() };
+        Self::from_tiles(levels, 0, std::slice::from_ref(&levels.levels), surface, run)
+    }
+
+    /// From a tree all of whose cells above the depth of the `tiles` are branches, and from the trees below the cells of that
+    /// depth, which follow each other as their siblings do: as they were built, and nothing is looked through again.
+    pub(crate) fn from_tiles(
+        whole: &Levels,
+        depth: u32,
+        tiles: &[Vec<Level>],
+        surface: Option<Arc<Surface>>,
+        run: &Run<'_>,
+    ) -> Result<Self> {
+        let ranks = run.blocks("count the leaves", tiles.len(), |tile| Ok(tiles[tile].iter().map(Level::ranks).collect()))?;
+        let flat = Flat { above: &whole.levels[..depth as usize], tiles, ranks, group: whole.root.division.children() };
         let mut portals = Vec::new();
-        let top = page(&flat, (0, 0), 0, &mut portals);
+        let top = page(&flat, Place { depth: 0, tile: 0, cell: 0 }, 0, &mut portals);
         let pages = run.blocks("put the tree together", portals.len(), |number| {
             Ok(Arc::new(page(&flat, portals[number], PAGE_DEPTH, &mut Vec::new())))
         })?;
         Ok(Self {
-            root: levels.root,
+            root: whole.root,
             top: Arc::new(top),
             pages,
             surface,
-            continuity: levels.continuity,
-            accuracy: levels.accuracy,
-            coverage: levels.coverage,
-            edits: levels.edits.clone(),
+            continuity: whole.continuity,
+            accuracy: whole.accuracy,
+            coverage: whole.coverage,
+            edits: whole.edits.clone(),
         })
     }
 
@@ -239,27 +251,49 @@ impl AdaptiveField {
 
 /// Levels to make pages of.
 struct Flat<'a> {
-    levels: &'a Levels,
-    ranks: &'a [Vec<u32>],
+    above: &'a [Level],
+    tiles: &'a [Vec<Level>],
+    /// By tile and level.
+    ranks: Vec<Vec<Vec<u32>>>,
     group: usize,
 }
 
-impl Tree for Flat<'_> {
-    /// Depth and number.
-    type Node = (u32, u32);
+/// A cell: of its level above the tiles, or of its level of a tile.
+#[derive(Clone, Copy)]
+struct Place {
+    depth: u32,
+    tile: u32,
+    cell: u32,
+}
 
-    fn record(&self, (depth, cell): Self::Node) -> Record {
+impl Tree for Flat<'_> {
+    type Node = Place;
+
+    fn record(&self, Place { depth, tile, cell }: Place) -> Record {
+        let level = self.above.get(depth as usize).unwrap_or_else(|| &self.tiles[tile as usize][depth as usize - self.above.len()]);
         // Of files written before, errors need not take in 0.
-        let record = &self.levels.levels[depth as usize].records[cell as usize];
+        let record = &level.records[cell as usize];
         Record::new(record.corners, record.error())
     }
 
-    fn shape(&self, (depth, cell): Self::Node, children: &mut Vec<Self::Node>) -> Shape<'_> {
-        let level = &self.levels.levels[depth as usize];
-        let rank = self.ranks[depth as usize][cell as usize] as usize;
+    fn shape(&self, Place { depth, tile, cell }: Place, children: &mut Vec<Place>) -> Shape<'_> {
+        let below = depth + 1;
+        if below as usize <= self.above.len() {
+            let all = cell * self.group as u32..(cell + 1) * self.group as u32;
+            let is_tile = below as usize == self.above.len();
+            children.extend(all.map(|child| match is_tile {
+                true => Place { depth: below, tile: child, cell: 0 },
+                false => Place { depth: below, tile, cell: child },
+            }));
+            return Shape::Branch;
+        }
+        let number = depth as usize - self.above.len();
+        let level = &self.tiles[tile as usize][number];
+        let rank = self.ranks[tile as usize][number][cell as usize] as usize;
         match level.kinds[cell as usize] {
             LevelKind::Branch => {
-                children.extend((rank * self.group..(rank + 1) * self.group).map(|child| (depth + 1, child as u32)));
+                let all = rank * self.group..(rank + 1) * self.group;
+                children.extend(all.map(|child| Place { depth: below, tile, cell: child as u32 }));
                 Shape::Branch
             }
             LevelKind::Linear => Shape::Linear,

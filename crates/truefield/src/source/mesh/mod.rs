@@ -97,6 +97,11 @@ impl Surface {
         self.signs.steady(self.tree.facet(triangle), p, nearest, triangle, radius)
     }
 
+    /// See `Signs::carry`, in the tree's units.
+    pub(crate) fn carry(&self, triangle: u32, distance: f64) -> f64 {
+        self.signs.carry(triangle, distance)
+    }
+
     /// See `Signs::whole`, in the tree's units.
     pub(crate) fn whole(&self, triangle: u32) -> Option<Whole> {
         self.signs.whole(triangle)

@@ -227,6 +227,16 @@ impl Signs {
         }
     }
 
+    /// The length of the paths off the surface that stay on the side of a point that is so far from `triangle`, its nearest one,
+    /// as far as that is known at once.
+    pub fn carry(&self, triangle: u32, distance: f64) -> f64 {
+        match &self.decided {
+            _ if self.parted => f64::INFINITY,
+            Some(decided) if !matches!(decided.walls, Walls::Trusted) && distance > self.blur => decided.left(triangle, distance),
+            _ => 0.0,
+        }
+    }
+
     /// Up to where the surface is whole around a triangle, if it is at all.
     pub fn whole(&self, triangle: u32) -> Option<Whole> {
         let decided = self.decided.as_ref()?;
@@ -290,7 +300,7 @@ impl Decided {
             return Some((Side::Outside, f64::INFINITY));
         }
         let wall = self.wall(triangle);
-        let left = f64::from(wall.reach) - nearest.distance_squared.sqrt() * (1.0 + 1e-9) - self.normals.rounding();
+        let left = self.left(triangle, nearest.distance_squared.sqrt());
         if left <= 0.0 {
             return None;
         }
@@ -301,6 +311,11 @@ impl Decided {
             || if self.normals.is_plane(facet, p, nearest, triangle) { side_of_plane(self.sum.corners(triangle), p) } else { None };
         let height = self.normals.side(facet, p, nearest, triangle).or_else(by_plane)?;
         Some((wall.side(height), left))
+    }
+
+    /// What is left of a triangle's reach so far from it.
+    fn left(&self, triangle: u32, distance: f64) -> f64 {
+        f64::from(self.wall(triangle).reach) - distance * (1.0 + 1e-9) - self.normals.rounding()
     }
 
     fn wall(&self, triangle: u32) -> Wall {
