@@ -91,7 +91,8 @@ impl Planes {
         self.sum = DVec3::ZERO;
         let mut turned = 0.0;
         for group in list.chunks(LANES) {
-            let (mut lanes, mut least) = ([[0.0; LANES]; 4], f64::INFINITY);
+            self.groups.push([[0.0; LANES]; 4]);
+            let (Some(lanes), mut least) = (self.groups.last_mut(), f64::INFINITY) else { return None };
             for lane in 0..LANES {
                 let plane = &planes[group[lane.min(group.len() - 1)].0 as usize];
                 let DVec3 { x, y, z } = plane.normal;
@@ -103,7 +104,6 @@ impl Planes {
             if !(least > reach) {
                 return None;
             }
-            self.groups.push(lanes);
         }
         (!list.is_empty()).then_some(turned)
     }
