@@ -72,4 +72,9 @@ def test_what_cannot_be_done_is_a_sentence(truefield: Command, folder: Path) -> 
         assert status == 2, words
         assert said.startswith("truefield: ")
         assert said.count("\n") == 1
+    for words in (
+        ("surface", folder / "blob.ply", "-o", folder / "b.stl"),
+        ("render", folder / "blob.ply", "-o", folder / "b.png"),
+    ):
+        assert "blob.ply' is a mesh; make a field of it first" in truefield.refused(*words)
     assert not list(folder.glob("b.*"))

@@ -39,6 +39,8 @@ def read(path: PathLike) -> TriangleMesh:
         with _opened(file) as stream:
             soup = formats.decode(stream, file)
         return _mesh(soup, file)
+    except FileError:
+        raise
     except FormatError as error:
         raise FileError(f"cannot read '{file}': {error}") from None
     except TruefieldError as error:

@@ -89,6 +89,15 @@ Askable = Annotated[
 ]
 
 
+def check_no_mesh(field: Path) -> None:
+    """Refuses a mesh where a field is wanted, and says how to make one."""
+    from truefield import formats
+    from truefield.errors import FileError
+
+    if field.suffix.lower() in formats.READABLE:
+        raise FileError(f"'{field}' is a mesh; make a field of it first, with truefield adaptive")
+
+
 def check_apart(*outputs: Path | None) -> None:
     """Refuses two outputs of the same name, of which the second would replace the first."""
     from truefield.errors import TruefieldError

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from truefield.cli.options import Threads, path
+from truefield.cli.options import Threads, check_no_mesh, path
 from truefield.cli.progress import progress
 
 _SAMPLES = (1, 9, 25)
@@ -40,6 +40,7 @@ def render(
     from truefield import files
     from truefield.pictures import field_picture
 
+    check_no_mesh(field)
     if output.suffix.lower() != ".png":
         raise tf.TruefieldError(f"'{output}' is no .png; pictures are written as PNG")
     if samples not in _SAMPLES:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from truefield.cli.options import FIELD_SUFFIX, Threads, path
+from truefield.cli.options import FIELD_SUFFIX, Threads, check_no_mesh, path
 from truefield.cli.progress import progress
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ def surface(
     import truefield as tf
     from truefield import files, formats
 
+    check_no_mesh(volume)
     formats.check(output)
     files.check_file(output)
     with progress() as report:
