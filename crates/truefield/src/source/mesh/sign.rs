@@ -186,9 +186,7 @@ impl Signs {
         }
         match decided.near(facet, p, nearest, triangle) {
             Some((side, _)) => side,
-            // On the surface there is no side to look for.
-            None if nearest.distance_squared == 0.0 => Side::PerhapsOutside,
-            None => decided.sum.side(p),
+            None => decided.hidden(facet, p, nearest, triangle).unwrap_or_else(|| decided.sum.side(p)),
         }
     }
 
@@ -216,8 +214,10 @@ impl Signs {
             Some(decided) if !self.parted && !matches!(decided.walls, Walls::Trusted) && !self.blurred(nearest) => {
                 match decided.near(facet, p, nearest, triangle) {
                     Some(known) => known,
-                    None if nearest.distance_squared == 0.0 => (Side::PerhapsOutside, 0.0),
-                    None => decided.sum.steady(p, radius),
+                    None => match decided.hidden(facet, p, nearest, triangle) {
+                        Some(guess) => (guess, 0.0),
+                        None => decided.sum.steady(p, radius),
+                    },
                 }
             }
             _ => {
@@ -318,6 +318,21 @@ impl Decided {
         f64::from(self.wall(triangle).reach) - distance * (1.0 + 1e-9) - self.normals.rounding()
     }
 
+    /// A guess where a side would say nothing: on the surface, and as near as its places are rounded to a triangle that
+    /// parts inside from outside. Sums seldom tell there, and take their time.
+    fn hidden(&self, facet: &Facet, p: DVec3, nearest: &FacetPoint, triangle: u32) -> Option<Side> {
+        if nearest.distance_squared == 0.0 {
+            return Some(Side::PerhapsOutside);
+        }
+        let ulp = f64::EPSILON * p.abs().max_element();
+        if nearest.distance_squared > (AT_SURFACE * ulp).powi(2) {
+            return None;
+        }
+        let wall = self.wall(triangle);
+        let parted = !matches!(self.walls, Walls::Trusted) && wall.reach > 0.0 && wall.parts();
+        (parted && self.sum.doubts(triangle, p)).then(|| self.guess(facet, p, triangle))
+    }
+
     fn wall(&self, triangle: u32) -> Wall {
         match &self.walls {
             Walls::Trusted | Walls::Clean => Wall::CLEAN,
@@ -333,6 +348,9 @@ impl Decided {
         }
     }
 }
+
+/// Places so many ulp of their largest coordinate off the surface may have been meant to be on it.
+const AT_SURFACE: f64 = 4.0;
 
 /// Vertices so many ulp of the largest coordinate apart are taken for one: what exporters leave behind.
 const NOISE: f64 = 8.0 * f64::EPSILON;
@@ -522,6 +540,31 @@ mod tests {
             assert!(asked_for > 3000 && f64::from(known) > 0.9 * f64::from(asked_for), "{known} of {asked_for}");
             assert!(both > 3000, "{both}");
         }
+    }
+
+    #[test]
+    fn points_put_on_edges_ask_for_no_sums() {
+        let asked = Asked::new(star(0.5, 0), SignChoice::Auto);
+        let decided = asked.signs.decided.as_ref().expect("a rule");
+        let mut r = random(31);
+        let (mut hidden, mut sums) = (0, 0);
+        for _ in 0..30_000 {
+            let [a, b, _] = asked.mesh.corners((r() * asked.mesh.triangles().len() as f64) as u32);
+            let p = a + (b - a) * r();
+            let (foot, triangle) = asked.foot(p);
+            let facet = asked.tree.facet(triangle);
+            if foot.distance_squared == 0.0 || decided.near(facet, p, &foot, triangle).is_some() {
+                continue;
+            }
+            match decided.hidden(facet, p, &foot, triangle) {
+                Some(guess) => {
+                    hidden += 1;
+                    assert!(!guess.is_certain() && foot.distance_squared.sqrt() < 1e-15, "{p}: {guess:?}, {foot:?}");
+                }
+                None => sums += 1,
+            }
+        }
+        assert!(hidden > 5000 && sums * 20 < hidden, "{hidden} {sums}");
     }
 
     /// Several meshes in one, each moved and turned inside out or not.

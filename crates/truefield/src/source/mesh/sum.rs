@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::bvh::boundary::Boundary;
-use crate::bvh::winding::{Estimate, Winding};
+use crate::bvh::winding::{Estimate, Winding, triangle as winding_of_one};
 use crate::error::{Error, Result};
 use crate::geom::{Aabb, DVec3};
 use crate::mesh::TriangleMesh;
@@ -55,6 +55,11 @@ impl Sum {
         let made = self.winding.get_or_init(|| winding(&self.mesh, &self.triangles, &Run::with_threads(1)).ok());
         let unknown = Estimate { value: 0.0, error: f64::INFINITY, doubt: f64::INFINITY };
         made.as_ref().map_or(unknown, |winding| winding.refine(p, enough))
+    }
+
+    /// Whether rounding hides from every sum on which side of a triangle `p` is.
+    pub fn doubts(&self, triangle: u32, p: DVec3) -> bool {
+        winding_of_one(&self.corners(triangle), p).doubt > 0.0
     }
 
     /// Of a triangle of the mesh that sides are decided on.

@@ -57,6 +57,11 @@ impl Wall {
         self.winding == 0
     }
 
+    /// Whether it parts inside from outside.
+    pub fn parts(&self) -> bool {
+        self.side(1.0) != self.side(-1.0)
+    }
+
     /// The side of a point on the outer side (`height` positive) or the inner one.
     pub fn side(&self, height: f64) -> Side {
         let winding = if height > 0.0 { self.winding } else { self.winding + 1 };
