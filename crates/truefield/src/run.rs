@@ -1,18 +1,19 @@
 //! Threads, cancellation and progress in one handle that every long job is given.
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 
 /// A flag that asks a running job to stop; jobs look at it between blocks of a few milliseconds.
 #[derive(Debug, Default)]
-pub struct Cancel(AtomicBool);
+pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
     /// A flag that is not set.
-    pub const fn new() -> Self {
-        Self(AtomicBool::new(false))
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Asks the job to stop.
@@ -40,7 +41,33 @@ impl Progress for Silent {
     fn report(&self, _: &'static str, _: usize, _: usize) {}
 }
 
-static NEVER: Cancel = Cancel::new();
+static NEVER: LazyLock<Cancel> = LazyLock::new(Cancel::new);
+
+thread_local! {
+    /// The flag of the job that this thread works for.
+    static HEARD: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
+}
+
+/// Whether the job that this thread works for was asked to stop: for work that takes long and is handed no [`Run`].
+pub(crate) fn is_cancelled() -> bool {
+    HEARD.with_borrow(|flag| flag.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed)))
+}
+
+/// Hears a job's flag on this thread for as long as it lives; a job that nobody can cancel leaves the flag of the one around it.
+struct Hearing(Option<Arc<AtomicBool>>);
+
+impl Hearing {
+    fn of(cancel: &Cancel) -> Self {
+        let inner = if Arc::ptr_eq(&cancel.0, &NEVER.0) { HEARD.with_borrow(Clone::clone) } else { Some(Arc::clone(&cancel.0)) };
+        Self(HEARD.replace(inner))
+    }
+}
+
+impl Drop for Hearing {
+    fn drop(&mut self) {
+        HEARD.set(self.0.take());
+    }
+}
 
 /// How a long job runs. The results never depend on `threads`.
 #[derive(Clone, Copy)]
@@ -76,6 +103,7 @@ impl Run<'_> {
         let failure: Mutex<Option<Error>> = Mutex::new(None);
         let failed = AtomicBool::new(false);
         let worker = || {
+            let _hearing = Hearing::of(self.cancel);
             let mut mine: Vec<(usize, T)> = Vec::new();
             while !failed.load(Ordering::Relaxed) {
                 let index = next.fetch_add(1, Ordering::Relaxed);
@@ -85,6 +113,8 @@ impl Run<'_> {
                 match self.cancel.check().and_then(|()| work(index)) {
                     Ok(value) => mine.push((index, value)),
                     Err(error) => {
+                        // What was cut short may fail in any way.
+                        let error = self.cancel.check().err().unwrap_or(error);
                         failed.store(true, Ordering::Relaxed);
                         failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                         break;

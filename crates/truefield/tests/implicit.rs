@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use residual::residuals;
 use truefield::laws::{Random, check_distance, check_lipschitz, check_threads};
 use truefield::source::implicit::{Binary, Expression, Implicit, Unary};
-use truefield::{Aabb, DVec3, Distance, Interval, Run, Source};
+use truefield::{Aabb, Cancel, DVec3, Distance, Interval, Run, Source};
 
 fn axes() -> [Expression; 3] {
     Expression::axes()
@@ -545,4 +545,20 @@ fn what_rounding_blurs_is_counted() {
             assert!(slack.widen(1e-15 * far).contains(truth - value), "{value} is not {truth} within {slack:?}");
         }
     }
+}
+
+/// A job that is asked to stop does so within one value, and says that it was stopped, whatever that value came to.
+#[test]
+fn a_long_search_hears_that_its_job_was_cancelled() {
+    let [x, y, z] = axes();
+    let ball = shape(&((square(&x) + square(&y) + square(&z)).unary(Unary::SquareRoot) - 1.0), cube(1.5));
+    let cancel = Cancel::new();
+    let run = Run { cancel: &cancel, ..Run::with_threads(1) };
+    let stopped = run.blocks("", 1, |_| {
+        cancel.cancel();
+        ball.values(&[DVec3::ZERO], &mut [0.0])
+    });
+    assert!(matches!(stopped, Err(truefield::Error::Cancelled)), "{stopped:?}");
+    // Nothing of it is left for the next.
+    assert!((value(&ball, DVec3::ZERO) + 1.0).abs() <= 2.0 * ball.noise());
 }

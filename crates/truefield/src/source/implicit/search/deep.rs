@@ -4,9 +4,13 @@ use super::super::boxes::halves;
 use super::super::sheet::Sheet;
 use super::super::taylor::Taylor;
 use super::{Effort, Search};
+use crate::run::is_cancelled;
 
 /// Boxes that a search makes in the depth at most, in some ten seconds.
 const DEEPEST: usize = 4_000_000;
+
+/// Boxes between two looks at whether the job was cancelled.
+const LOOK: usize = 64;
 
 impl Search<'_> {
     /// Whether what is not kept is looked at nevertheless: around a foot, without which there is no end.
@@ -18,11 +22,13 @@ impl Search<'_> {
     pub(super) fn go_deep(&mut self) {
         // The middle of bounds that far apart is as near as the noise.
         let enough = 1.9 * self.accuracy.hard;
+        let mut stopped = false;
         while let Some((bound, extent)) = self.deep.pop() {
+            stopped = stopped || self.made.is_multiple_of(LOOK) && is_cancelled();
             if self.is_done(bound, enough) {
                 continue;
             }
-            if self.made > DEEPEST || extent.size().max_element() <= 0.125 * self.accuracy.smooth {
+            if stopped || self.made > DEEPEST || extent.size().max_element() <= 0.125 * self.accuracy.smooth {
                 self.set_aside(bound, false);
                 continue;
             }
