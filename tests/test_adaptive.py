@@ -130,6 +130,11 @@ def test_what_does_not_fit_is_refused_before_it_is_built(part: tf.TriangleMesh) 
             tf.adaptive_field(shape, 1e-6, memory=2**22)
         with pytest.raises(MemoryError, match="of 1e-14 "):
             tf.adaptive_field(shape, 1e-14, memory=2**22)
+    # Whoever need not have cells alone is told what takes fewer.
+    with pytest.raises(MemoryError, match="method mixed"):
+        tf.adaptive_field(part, 1e-6, memory=2**22)
+    with pytest.raises(MemoryError, match=r"a max_depth\)"):
+        tf.adaptive_field(part, 1e-14, method="cubic", memory=2**22)
 
 
 def test_progress_is_told_and_can_stop() -> None:

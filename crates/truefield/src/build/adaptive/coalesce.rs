@@ -75,7 +75,7 @@ pub fn coalesce(samples: &SampledField, rules: &Rules, run: &Run<'_>) -> Result<
         }
         cells += level.kinds.len() as u64;
         levels.levels.push(level);
-        rules.fits(levels.levels.len() as u32, cells, below.len() as u64, rules.tolerance)?;
+        rules.fits(cells, below.len() as u64, || format!("{cells} cells so far; choose a larger tolerance or growth, or a max_depth"))?;
         nodes = below;
     }
     levels.derive_errors();

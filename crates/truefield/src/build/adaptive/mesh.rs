@@ -480,7 +480,7 @@ impl<'a> Builder<'a> {
 
     /// Stores a cell; the lists of its level are for the caller to keep up.
     fn push(&mut self, seen: &Seen<'_>, kind: LevelKind, run: &Run<'_>) -> Result<&mut Level> {
-        let Job { surface, depth, tiles, rules, .. } = *self.job;
+        let Job { surface, depth, tiles, rules, leaves, .. } = *self.job;
         let scale = surface.scale();
         let record = Record::new(seen.values, Interval { lower: seen.known.lower / scale, upper: seen.known.upper / scale });
         let level = depth - seen.start.edge.trailing_zeros();
@@ -488,7 +488,8 @@ impl<'a> Builder<'a> {
         if self.count.is_multiple_of(COUNTED) {
             run.cancel.check()?;
             let cells = self.job.cells.fetch_add(COUNTED as u64, Ordering::Relaxed) + COUNTED as u64;
-            rules.fits(level, cells, cells, f64::from(record.upper.max(-record.lower)))?;
+            let other = if leaves == Leaves::Linear { ", or method mixed, which keeps triangles where cells would be many" } else { "" };
+            rules.fits(cells, cells, || format!("{cells} cells so far; choose a larger tolerance or growth, or a max_depth{other}"))?;
         }
         let number = (level - tiles) as usize;
         self.levels.resize_with(self.levels.len().max(number + 1), Level::default);

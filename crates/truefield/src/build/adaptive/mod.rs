@@ -103,16 +103,13 @@ impl Rules {
         self.accuracy().allowed(least)
     }
 
-    /// Refuses to go on where the next level would not fit.
-    pub(crate) fn fits(&self, depth: u32, cells: u64, next: u64, within: f64) -> Result<()> {
+    /// Refuses to go on where `next` cells beside those that there are would not fit; `state` says how far it is, and what to choose.
+    pub(crate) fn fits(&self, cells: u64, next: u64, state: impl FnOnce() -> String) -> Result<()> {
         let needed = cells * (size_of::<Record>() as u64 + 8) + next * DRAFT;
         if needed <= self.memory {
             return Ok(());
         }
-        let what = format!(
-            "an adaptive field to a tolerance of {:?} (depth {depth} with {cells} cells reaches {within:.3e}; choose a larger tolerance or growth, or a max_depth)",
-            self.tolerance
-        );
+        let what = format!("an adaptive field to a tolerance of {:?} ({})", self.tolerance, state());
         Err(Error::Memory { what, needed, allowed: self.memory })
     }
 }
@@ -175,7 +172,9 @@ pub fn adaptive(source: &dyn Source, root: Root, rules: &Rules, run: &Run<'_>) -
         };
         let branches: usize = parts.iter().map(|part| part.branches.len()).sum();
         let within = parts.iter().map(|part| part.worst).fold(0.0, f64::max);
-        rules.fits(depth, cells, (branches * root.division.children()) as u64, within)?;
+        rules.fits(cells, (branches * root.division.children()) as u64, || {
+            format!("depth {depth} with {cells} cells reaches {within:.3e}; choose a larger tolerance or growth, or a max_depth")
+        })?;
         let mut level = Level::default();
         parents = Vec::with_capacity(branches);
         for part in parts {
