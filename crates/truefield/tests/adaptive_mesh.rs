@@ -97,6 +97,32 @@ fn bounds_hold_the_truth_of_every_nasty_mesh() {
     }
 }
 
+/// Squares of its lengths are no numbers of single precision.
+#[test]
+fn bounds_hold_in_a_domain_of_any_size() {
+    let open = {
+        let whole = shapes::welded(&shapes::icosphere(2));
+        let triangles = whole.triangles()[5..].to_vec();
+        TriangleMesh::new(whole.vertices().to_vec(), triangles).expect("a mesh")
+    };
+    for mesh in [shapes::welded(&shapes::icosphere(2)), open] {
+        let surface = surface(mesh);
+        for reach in [1e19, 1e20, 1e30, 9e37] {
+            let place = root(&*surface, Some(Aabb::new(DVec3::splat(-reach), DVec3::splat(reach))), Division::Octree).expect("a box");
+            for leaves in [Leaves::Linear, Leaves::Exact, Leaves::Mixed] {
+                let rules = Rules { max_depth: 4, ..Rules::within(1e-2 * reach) };
+                let field = adaptive_mesh(&surface, place, leaves, &rules, &Run::default()).expect("a tree");
+                let mut random = Random::new(5);
+                for _ in 0..500 {
+                    let p = random.within(&place.extent) * random.length(0.3 / reach, 1.0);
+                    let (found, truth) = (field.at(p), surface.at(p));
+                    assert!(found.lower <= truth.lower && truth.upper <= found.upper, "{truth:?} at {p} is not in {found:?}, {leaves:?}");
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn bounds_hold_close_to_smooth_sharp_and_rough_surfaces() {
     let parts = [

@@ -45,6 +45,9 @@ const MOST: usize = 2048;
 /// the parts.
 const FAR: f64 = 3.0;
 
+/// Squares of lengths up to this, in the tree's units, are numbers of single precision with room to spare, as lists need.
+const FARTHEST: f64 = (1u64 << 60) as f64;
+
 /// What no number is in.
 const NOTHING: Interval = Interval { lower: f64::INFINITY, upper: f64::NEG_INFINITY };
 
@@ -266,10 +269,11 @@ impl<'a> Builder<'a> {
         done
     }
 
-    /// The complete list of a cell, of no more than about `most` triangles.
+    /// The complete list of a cell, of no more than about `most` triangles; none of cells so far off that lengths overflow.
     fn gather(&mut self, seen: &Seen<'_>, most: usize, list: &mut Vec<Slot>) -> bool {
-        let feet = seen.corners.map(|corner| corner.foot);
-        gather_few(self.job.surface.tree(), &seen.cell, &feet, most, &mut self.scratch, list)
+        let (tree, feet) = (self.job.surface.tree(), seen.corners.map(|corner| corner.foot));
+        let reach = (seen.cell.center() - tree.center).length() + seen.cell.radius() + tree.radius;
+        reach <= FARTHEST && gather_few(tree, &seen.cell, &feet, most, &mut self.scratch, list)
     }
 
     /// Judges a cell by the corners of its parts, and divides it where that is not enough.
