@@ -19,7 +19,7 @@
 
 use super::corner::{Corner, nearest_of};
 use super::halves::{blend, of_part};
-use super::planes::{Plane, Planes, Slopes, stretched};
+use super::planes::{Plane, Planes, Slopes, TURNED, stretched};
 use super::triangles::{SHORT, above_triangles, below_triangles};
 use crate::bvh::cover::{OCTANTS, Range};
 use crate::bvh::octants::{NODES, node};
@@ -181,9 +181,11 @@ impl<'a> Prover<'a> {
 
     /// Rounding of lengths within the cell and the surface.
     pub fn slack(&self, cell: &Aabb) -> f64 {
-        // A normal of the flattest triangle that is relied on is off by 1e-9; a cell's list may reach across the surface.
         let reach = cell.min.abs().max(cell.max.abs()).max_element().max(self.reach);
-        128.0 * f64::EPSILON * reach + 1e-9 * cell.radius()
+        // A cell's list may reach across the surface, and what is meant to be over a plane goes as far.
+        let tree = self.surface.tree();
+        let across = (cell.center() - tree.center).length() + cell.radius() + tree.radius;
+        128.0 * f64::EPSILON * reach + TURNED * across + 1e-9 * cell.radius()
     }
 }
 

@@ -20,7 +20,11 @@ use crate::source::mesh::Surface;
 const STEEPEST: f64 = 0.1;
 
 /// Triangles flatter than this have no normal to rely on.
-const FLAT: f64 = 1e-6;
+const FLAT: f64 = 1e-3;
+
+/// How far rounding turns the normal of the flattest triangle that is relied on: edges are multiplied, and what is left is
+/// as short as the triangle is flat.
+pub(super) const TURNED: f64 = 8.0 * f64::EPSILON / FLAT;
 
 /// How far normals may be off that are relied on.
 const ROUNDED: f64 = 1e-9;
