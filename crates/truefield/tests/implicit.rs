@@ -562,3 +562,19 @@ fn a_long_search_hears_that_its_job_was_cancelled() {
     // Nothing of it is left for the next.
     assert!((value(&ball, DVec3::ZERO) + 1.0).abs() <= 2.0 * ball.noise());
 }
+
+/// Where a face of the domain touches the surface, leaves leave open how near it is. From the middle of a ball in its cube they
+/// are as near as all of it: searches for values end elsewhere than those for bounds, and what is said of values holds of these.
+#[test]
+fn slack_is_that_of_values_next_to_leaves_that_leave_the_distance_open() {
+    let [x, y, z] = axes();
+    let square_of_way = square(&x) + square(&y) + square(&z);
+    for (half, p) in [(1.0, DVec3::new(1.517e-4, 2.604e-4, 4.926e-4)), (0.9999, DVec3::new(-1.4e-5, 1.3e-5, -2.8e-5))] {
+        let ball = shape(&(square_of_way.clone().unary(Unary::SquareRoot) - 1.0), cube(half));
+        let truth = (p.length() - 1.0).max(p.abs().max_element() - half);
+        let (at, value, slack) = (ball.at(p), value(&ball, p), ball.slack(&Aabb::new(p, p).grow(1e-7)));
+        assert!(at.widen(1e-15).contains(truth), "{truth} is not in {at:?}");
+        assert!(slack.widen(1e-15).contains(truth - value), "{value} is not {truth} within {slack:?}");
+        assert!(at.widen(ball.noise()).contains(value), "{value} is not in {at:?}");
+    }
+}

@@ -216,14 +216,31 @@ impl Boxes {
         node.sheet.map(leaf).or_else(|| node.slab.map(|slab| &self.slabs[slab as usize]).map(|(taylor, sheet)| (taylor, sheet)))
     }
 
+    /// No more than how far `cell` is from leaves that leave open how near the surface is to any point of them.
+    pub(super) fn open_beyond(&self, cell: &Aabb) -> f64 {
+        let mut nearest = f64::INFINITY;
+        let mut pending = vec![0_usize];
+        while let Some(index) = pending.pop() {
+            let Some(node) = self.nodes.get(index).filter(|node| node.known > 0.0) else { continue };
+            let apart = apart(&node.extent, cell);
+            if apart >= nearest {
+                continue;
+            }
+            if node.count == 0 {
+                nearest = apart;
+            }
+            pending.extend((0..usize::from(node.count)).map(|child| node.first as usize + child));
+        }
+        nearest * (1.0 - 4.0 * f64::EPSILON)
+    }
+
     /// How well the surface near `cell` is known: the worst of the leaves that are not farther from it than `reach`.
     pub(super) fn known_near(&self, cell: &Aabb, reach: f64) -> f64 {
         let mut worst = 0.0_f32;
         let mut pending = vec![0_usize];
         while let Some(index) = pending.pop() {
             let Some(node) = self.nodes.get(index) else { continue };
-            let apart = (node.extent.min - cell.max).max(cell.min - node.extent.max).max(DVec3::ZERO).length();
-            if apart > reach || node.known <= worst {
+            if apart(&node.extent, cell) > reach || node.known <= worst {
                 continue;
             }
             if node.count == 0 {
@@ -233,6 +250,11 @@ impl Boxes {
         }
         f64::from(worst)
     }
+}
+
+/// How far two boxes are from each other.
+fn apart(a: &Aabb, b: &Aabb) -> f64 {
+    (a.min - b.max).max(b.min - a.max).max(DVec3::ZERO).length()
 }
 
 fn node(extent: Aabb) -> Node {

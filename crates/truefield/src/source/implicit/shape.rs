@@ -209,17 +209,16 @@ impl Source for Implicit {
     }
 
     fn slack(&self, cell: &Aabb) -> Interval {
-        let (at, value) = self.answer(cell.center(), Effort::Short);
+        let at = self.at(cell.center());
         let radius = cell.radius() * (1.0 + 1e-15);
         let near = at.upper.max(-at.lower) + radius;
-        // Where bounds meet, the value is their middle and less than the noise from the distance. Elsewhere it is how far a
-        // box is that may hold surface: `known` says how much farther the surface is than any point of such a box. There are
-        // no other values: see `answer`.
-        let error = self.boxes.known_near(cell, near) + 2.0 * self.noise();
-        // Both change by no more than one moves.
-        let moved = 2.0 * radius + self.noise();
-        let [lower, upper] = value.map_or([-error, error], |value| [at.lower - value - moved, at.upper - value + moved]);
-        Interval { lower: lower.max(-error), upper: upper.min(error) }
+        // Where bounds meet, the value is their middle and less than the noise from the distance. Elsewhere it is nearer to zero:
+        // how far a box is that may hold surface. `known` says how much farther the surface is than any point of such a box,
+        // and no such box is nearer than the next of them. There are no other values: see `answer`. Which of them it is, a
+        // search from the middle of the cell does not say: searches end at different boxes.
+        let met = 2.0 * self.noise();
+        let error = (self.boxes.known_near(cell, near) + met).min(met.max(near - self.boxes.open_beyond(cell)));
+        Interval { lower: if at.lower > radius { -met } else { -error }, upper: if at.upper < -radius { met } else { error } }
     }
 
     fn bend(&self, cell: &Aabb) -> Interval {

@@ -186,13 +186,11 @@ impl<'a> Search<'a> {
                 self.reach(item);
                 continue;
             }
-            if self.is_full() {
-                let known = self.is_known(item);
-                if known || !self.goes_deep() {
-                    self.set_aside(bound, known);
-                    self.reach(item);
-                    continue;
-                }
+            let known = self.is_known(item);
+            if self.is_full(known) && (known || !self.goes_deep()) {
+                self.set_aside(bound, known);
+                self.reach(item);
+                continue;
             }
             match item {
                 Place::Node(_) => {}
@@ -235,9 +233,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether no more boxes are kept.
-    fn is_full(&self) -> bool {
-        self.pieces.len() > if self.goes_deep() { SOON } else { MOST } || self.open > OPEN
+    /// Whether no more boxes are kept: soon, of those that the depth takes.
+    fn is_full(&self, known: bool) -> bool {
+        self.pieces.len() > if !known && self.goes_deep() { SOON } else { MOST } || self.open > OPEN
     }
 
     /// Whether a leaf says how far the surface is from any point of it.
@@ -425,7 +423,7 @@ impl<'a> Search<'a> {
     }
 
     fn add(&mut self, bound: f64, piece: Piece) {
-        if !piece.known && self.goes_deep() && self.is_full() {
+        if !piece.known && self.goes_deep() && self.is_full(false) {
             self.deep.push((bound, piece.extent));
             return;
         }
