@@ -335,7 +335,12 @@ fn least_square(slope: [f64; 2], bend: [f64; 2], mixed: f64, half: [f64; 2]) -> 
     }
     let determinant = bend[0] * bend[1] - mixed * mixed;
     let still = [0, 1].map(|k| (mixed * slope[1 - k] - bend[1 - k] * slope[k]) / determinant);
-    if determinant > 0.0 && still[0].abs() < half[0] && still[1].abs() < half[1] { least.min(at(still)) } else { least }
+    if !(determinant > 0.0 && still[0].abs() < half[0] && still[1].abs() < half[1]) {
+        return least;
+    }
+    // Where the determinant is a small difference, rounding leaves a slope; what is convex lies above its tangent there.
+    let left = |k: usize| 2.0 * (slope[k] + bend[k] * still[k] + mixed * still[1 - k]).abs() * (half[k] + still[k].abs());
+    least.min(at(still) - left(0) - left(1))
 }
 
 /// Goes on with parts that no bound decided, halving them, the nearest first.
@@ -395,6 +400,27 @@ fn cut(tree: &Tree, p: DVec3, accuracy: f64, bound: f64, whole: &Half, best: &mu
         } else if !part.solve(tree, p, accuracy, best) {
             part.walk(tree, p, best);
             keep(bound, half);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::laws::Random;
+
+    #[test]
+    fn nothing_is_below_the_least_of_a_square_that_hardly_bends_one_way() {
+        let mut random = Random::new(3);
+        for _ in 0..20_000 {
+            let mut within = || random.within(&crate::geom::Aabb::new(DVec3::NEG_ONE, DVec3::ONE));
+            let (t, of) = (within(), within());
+            let mixed = 2.0 * of.x;
+            let bend = [1.0, mixed * mixed + 10.0_f64.powf(7.5 * (of.y - 1.0))];
+            let slope = [-(t.x + mixed * t.y), -(mixed * t.x + bend[1] * t.y)];
+            let there = 2.0 * (slope[0] * t.x + slope[1] * t.y) + t.x * t.x + bend[1] * t.y * t.y + 2.0 * mixed * t.x * t.y;
+            let least = least_square(slope, bend, mixed, [1.0, 1.0]);
+            assert!(least <= there + 4e-14, "{least:e} is above {there:e}, by {:e}", least - there);
         }
     }
 }
