@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import struct
 import zipfile
 from collections.abc import Callable
@@ -152,6 +153,45 @@ def test_pieces_end_anywhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
             assert np.array_equal(parts.vertices, mesh.vertices)
             assert np.array_equal(parts.triangles, mesh.triangles)
     assert whole["part.obj"].triangles.tolist() == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("beyond", [-2, -1, 0, 1])
+def test_ply_headers_may_end_anywhere(tmp_path: Path, line_end: str, beyond: int) -> None:
+    cube().write(path := tmp_path / "cube.ply")
+    header, _, body = path.read_bytes().partition(b"end_header\n")
+    first, _, rest = header.partition(b"\n")
+    lines = line_end.encode().join([first, b"comment %s", *rest.split(b"\n")])
+    # The first piece that is read ends next to the line break, before which is the header's last word.
+    room = 65536 + beyond - len(lines + b"end_header") + 2
+    wrote(path, lines.replace(b"%s", b"x" * room) + b"end_header" + line_end.encode() + body)
+    assert np.array_equal(tf.read(path).triangles, cube().triangles)
+    assert np.array_equal(tf.read(path).vertices, cube().vertices)
+
+
+def test_ply_of_a_large_polygon_and_many_small_ones_takes_no_more_than_itself(tmp_path: Path) -> None:
+    corners = 300_000
+    angle = np.linspace(0, 2 * np.pi, corners, endpoint=False)
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {corners}\nproperty double x\nproperty double y\n"
+    header += "property double z\nelement face 60000\nproperty list uint uint vertex_indices\nend_header\n"
+    disk = np.stack((np.cos(angle), np.sin(angle), 0 * angle), axis=1).astype("<f8")
+    large = np.concatenate(([corners], np.arange(corners))).astype("<u4")
+    small = np.tile(np.array([3, 0, 1, 2], dtype="<u4"), 59_999)
+    path = wrote(tmp_path / "disk.ply", header.encode() + disk.tobytes() + large.tobytes() + small.tobytes())
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    # 60 000 rows as long as the first would take 72 GB.
+    resource.setrlimit(resource.RLIMIT_AS, (32 << 30, limits[1]))
+    try:
+        mesh = tf.read(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+    assert len(mesh.triangles) == corners - 2 + 59_999
+
+
+def test_elements_of_ply_without_properties_are_passed_over(tmp_path: Path) -> None:
+    cube().write(path := tmp_path / "cube.ply")
+    wrote(path, path.read_bytes().replace(b"element vertex", b"element nothing 3\nelement vertex", 1))
+    assert np.array_equal(tf.read(path).triangles, cube().triangles)
 
 
 def test_a_pipe_is_read_like_a_file(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import IO, TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from truefield.files import size_of
 from truefield.formats.polygons import Column, FormatError, Soup, fan, numbers, pieces
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ _NAMES: Final = {
 _ORDERS: Final = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _ROWS: Final = 65_536
 _START: Final = 1 << 16  # bytes in which headers and rows nearly always end
+_END: Final = b"end_header"
 _CORNERS: Final = ("vertex_indices", "vertex_index")
 
 
@@ -134,12 +136,13 @@ def _header(stream: IO[bytes]) -> tuple[str | None, list[_Element]]:
     start, data = stream.tell(), stream.read(_START)
     if not data.startswith((b"ply\n", b"ply\r")):
         raise FormatError("it does not begin with 'ply', so it is no PLY")
-    while (end := data.find(b"end_header")) < 0 and (more := stream.read(_START)):
+    # The line break belongs to it. Pieces double, so that long files are not copied again and again.
+    while ((end := data.find(_END)) < 0 or len(data) < end + len(_END) + 2) and (more := stream.read(len(data))):
         data += more
     if end < 0:
         raise FormatError("its header has no 'end_header'; the file is truncated or no PLY")
     # The body begins after one line break; a lone carriage return is one only where the header uses it too.
-    after = end + len(b"end_header")
+    after = end + len(_END)
     after += 2 if data[after : after + 2] == b"\r\n" else 1
     order: str | None = ""
     elements: list[_Element] = []
@@ -236,13 +239,13 @@ def _binary_parts(element: _Element, stream: IO[bytes], order: str) -> Iterator[
         ]
     )
     lists = [i for i, column in enumerate(element.properties) if column.count_kind]
-    for first in range(0, element.rows, _ROWS):
+    for first in range(0, element.rows if element.properties else 0, _ROWS):
         count = min(_ROWS, element.rows - first)
         at = stream.tell()
-        data = stream.read(count * record.itemsize)
-        whole = len(data) == count * record.itemsize
+        # Asking for more than there is would make room for it: rows of long lists may be of any size.
+        whole = count * record.itemsize <= size_of(stream) - at
         _enough(element, whole or bool(lists))
-        rows = np.frombuffer(data, dtype=record) if whole else None
+        rows = np.frombuffer(stream.read(count * record.itemsize), dtype=record) if whole else None
         if rows is None or not all((rows[f"count{i}"] == lengths[i]).all() for i in lists):
             stream.seek(at)
             yield from _walk(element._replace(rows=element.rows - first), stream, order)

@@ -37,7 +37,7 @@ class Column(Generic[_Number]):
 
     def add(self, numbers: NDArray[_Number]) -> None:
         """More of them, in order."""
-        self._bytes += np.ascontiguousarray(numbers).data.cast("B") if numbers.size else b""
+        self._bytes += np.ascontiguousarray(numbers, self._kind).data.cast("B") if numbers.size else b""
 
     def __len__(self) -> int:
         """How many there are."""
