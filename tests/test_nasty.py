@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import truefield as tf
 from nasty import BORDERLINE, FLAWS, NASTY
+from solids import cube
 from truefield.check import Finding
 
 
@@ -86,3 +87,11 @@ def test_decided_sides_follow_the_winding_number(name: str) -> None:
     assert np.array_equal(high[judged] < 0.0, winding[judged] > 0.5)
     if name not in ("double_sheet", *BORDERLINE):
         assert judged.mean() > 0.95
+
+
+def test_points_too_far_to_square_are_refused() -> None:
+    surface = tf.Surface(cube())
+    assert surface.distance([[1e150, 0, 0]])[0] == pytest.approx(1e150)
+    for ask in (surface.distance, surface.bounds):
+        with pytest.raises(tf.TruefieldError, match=r"point 1 is .* give coordinates of 1e150 at most"):
+            ask(np.array([[0, 0, 0], [0, -1e155, 0]]))

@@ -493,7 +493,7 @@ def adaptive_field(
 
 
 def _rays(origins: ArrayLike, directions: ArrayLike) -> tuple[Floats, Floats]:
-    start, along = arguments.points(origins), arguments.points(directions)
+    start, along = arguments.points(origins), arguments.vectors(directions)
     if len(start) != len(along) and 1 not in (len(start), len(along)):
         raise TruefieldError(f"{len(start)} origins need as many directions, not {len(along)}; or give one for all")
     count = max(len(start), len(along)) if len(start) and len(along) else 0

@@ -15,10 +15,25 @@ Progress = Callable[[str, float], None]
 
 _MOST_CELLS_ALONG_A_SIDE = 2**31
 _MOST_BYTES = 2**63
+_FARTHEST = 1e150
 
 
 def points(points: ArrayLike) -> Floats:
-    """(n, 3) float64, C-contiguous and aligned; a single point may be given as (3,)."""
+    """What `vectors` gives, without finite coordinates beyond 1e150: no number holds their squared distances."""
+    array = vectors(points)
+    if array.size and not (array.min() >= -_FARTHEST and array.max() <= _FARTHEST):
+        far = ((np.abs(array) > _FARTHEST) & np.isfinite(array)).any(axis=1)
+        if far.any():
+            x, y, z = array[np.argmax(far)].tolist()
+            raise TruefieldError(
+                f"point {int(np.argmax(far))} is ({x}, {y}, {z}), beyond what distances are found for; "
+                "give coordinates of 1e150 at most"
+            )
+    return array
+
+
+def vectors(points: ArrayLike) -> Floats:
+    """(n, 3) float64, C-contiguous and aligned; a single one may be given as (3,)."""
     try:
         array = real(points)
     except (TypeError, ValueError):

@@ -186,7 +186,7 @@ def sweep(tool: Solid, path: ArrayLike) -> Shape:
         raise TruefieldError("path has no points; give at least one")
     poses = way.ndim == 3 and way.shape[1:] == (4, 4)
     if not poses:
-        way = arguments.points(way)
+        way = arguments.vectors(way)
     if not np.isfinite(way).all():
         raise TruefieldError("path has numbers that are not finite; all must be")
     text = f"csg.sweep({inner(cutter)}, <{len(way)} {'poses' if poses else 'points'}>)"

@@ -203,7 +203,7 @@ def evaluate(
     Raises:
         TruefieldError: the expression has numbers in it that are not finite, or the points are not (n, 3).
     """
-    return _expression(expression)._native.evaluate(arguments.points(points), threads, progress)
+    return _expression(expression)._native.evaluate(arguments.vectors(points), threads, progress)
 
 
 def field(
